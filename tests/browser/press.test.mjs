@@ -180,6 +180,34 @@ test('a body in the plane lies flat with its mesh, and is pushed from outside', 
   assert.deepEqual(page.complaints, []);
 });
 
+test('a body in the plane is pressed from within too, deeper by a drag inwards, and by keys', async (t) => {
+  const at = await folder(t);
+  const file = await bake(at, await readFile(path.join(source, 'meshes/models/plate/model.toml'), 'utf8'), 'plate');
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0'], at);
+  const page = await ready(await visit(t, served.url, { hasTouch: true }));
+  await choose(page, 'press', 0.02);
+  const { x, y } = await project(page, [0.45, 0.7, 0]); // the top, at y = 1, is nearest
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  const pressed = await settled(page);
+  assert.ok(pressed.force[1] < 0, `force ${pressed.force}`);
+  const deeper = await project(page, [0.45, 0.66, 0]);
+  await page.mouse.move(deeper.x, deeper.y);
+  await until(page, (force) => window.palpate.lastFrame.force[1] < 2 * force, pressed.force[1]); // 20 mm become 60
+  await page.mouse.up();
+  await until(page, () => window.palpate.lastFrame.contacts === 0);
+  await part(page, 'view').focus();
+  await page.keyboard.press('Enter');
+  assert.ok((await settled(page)).force[1] < 0);
+  await page.keyboard.press('Enter');
+  await until(page, () => window.palpate.lastFrame.contacts === 0);
+  const finger = await page.context().newCDPSession(page);
+  await finger.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: [{ x, y }] });
+  assert.ok((await settled(page)).force[1] < 0);
+  await finger.send('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
+  assert.deepEqual(page.complaints, []);
+});
+
 test('a best effort is told while it lasts, with the size of its error and marks in the plot', async (t) => {
   const { page } = await open_cube(t, { cells: 8, args: ['--tool', 'sphere:0.5', '--max-contacts', '3'] });
   const banner = part(page, 'best-effort');

@@ -266,6 +266,7 @@ class Page implements Listener {
       // A body that swings has moved on since it was drawn.
       clearance: 0.25 * shape.radius + (state.model.moves ? 0.025 : 0.008) * state.model.size,
       contact: 1e-4 * state.model.size,
+      floor: this.picture_.floor,
       shape,
     };
   }

@@ -89,9 +89,15 @@ export function thickness_below(surface: Surface, hit: Hit): number {
 
 /**
  * In the plane: the nearest point of the boundary, up to `reach` away from `place` (z = 0); null: none is so near. `edge` has
- * the body on its left.
+ * the body on its left. `has_room`: whether a tool may come to a point from there.
  */
-export function pick_boundary(position: ArrayLike<number>, edge: ArrayLike<number>, place: Vec3, reach: number): Hit | null {
+export function pick_boundary(
+  position: ArrayLike<number>,
+  edge: ArrayLike<number>,
+  place: Vec3,
+  reach: number,
+  has_room: (hit: Hit) => boolean = () => true,
+): Hit | null {
   let nearest = reach * reach;
   let hit: Hit | null = null;
   for (let e = 0; e < edge.length; e += 2) {
@@ -102,11 +108,31 @@ export function pick_boundary(position: ArrayLike<number>, edge: ArrayLike<numbe
     const point = plus(a, along, share);
     const apart = minus(place, point);
     const distance2 = dot(apart, apart);
-    if (distance2 > nearest) continue;
+    const found = { point, normal: normalised([along[1], -along[0], 0]) };
+    if (distance2 > nearest || !has_room(found)) continue;
     nearest = distance2;
-    hit = { point, normal: normalised([along[1], -along[0], 0]) };
+    hit = found;
   }
   return hit;
+}
+
+/** In the plane: whether a place is within the boundary. */
+export function is_inside(position: ArrayLike<number>, edge: ArrayLike<number>, [x, y]: Vec3): boolean {
+  let inside = false;
+  for (let e = 0; e < edge.length; e += 2) {
+    const [ax, ay] = at(position, edge[e]!);
+    const [bx, by] = at(position, edge[e + 1]!);
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
+  }
+  return inside;
+}
+
+/** In the plane a press begins at the nearest point of the boundary, and goes with the pointer: along the boundary, and inwards. */
+export function follow_in_plane(now: Hit, nearest: Hit, place: Vec3): { hit: Hit; deeper: number } {
+  // Past the middle of the body its other side is nearer: the tool stays on its own.
+  const inwards = (hit: Hit) => dot(minus(hit.point, place), hit.normal);
+  const hit = inwards(nearest) > 0 && dot(nearest.normal, now.normal) < 0 ? now : nearest;
+  return { hit, deeper: Math.max(0, inwards(hit)) };
 }
 
 /** The edges that belong to one triangle only, in its sense: of triangles that turn left, the body is on their left. */

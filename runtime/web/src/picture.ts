@@ -116,6 +116,11 @@ export class Picture {
     this.view.draw();
   }
 
+  /** How high the floor is that the body may fall on; null: there is none. */
+  get floor(): number | null {
+    return this.walls_.floor;
+  }
+
   /** How it is drawn from now on. */
   take(drawn: Drawn): void {
     const { body, view } = this;

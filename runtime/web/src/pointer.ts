@@ -1,6 +1,6 @@
 // The pointer as the hand: presses, pushes and grabs what is under it.
 import type { Body } from './body';
-import { pick_boundary, pick_surface, thickness_below, type Hit, type Surface } from './pick';
+import { follow_in_plane, is_inside, pick_boundary, pick_surface, thickness_below, type Hit, type Surface } from './pick';
 import { minus, plus, pressed_position, ray_meets_plane, turn_onto, turned_depth, type ToolShape } from './pose';
 import type { View } from './view';
 import type { Point, Quaternion, Vec3 } from './words';
@@ -10,7 +10,7 @@ export type PointerMode = (typeof pointer_modes)[number];
 
 const least_wait = 8; // [ms] from one word to the next
 const key_id = -1; // in the place of a pointer's
-const reach_in_plane = 24; // pixels from the boundary that still touch it
+const reach_in_plane = 24; // pixels from the boundary that still touch it from outside
 
 export interface HandSettings {
   mode: PointerMode;
@@ -19,6 +19,7 @@ export interface HandSettings {
   unit_depth: number; // [m] a wheel's notch is a tenth of it
   clearance: number; // [m] of a tool that hovers
   contact: number; // [m] of one that all but touches
+  floor: number | null; // that the body lies on: the tool does not come from below
   shape: ToolShape;
 }
 
@@ -30,6 +31,7 @@ interface Press {
   orientation: Quaternion;
   surface: Surface; // as it was when the press began: the tool slides along it
   depth: number;
+  deeper: number; // [m] in the plane: by a drag into the body
   pushed: number; // [m] of the wheel, into the picture
   client: { x: number; y: number };
   begun_at: number; // [ms] when it was said, and when ...
@@ -133,7 +135,7 @@ export class Hand {
   private begin(x: number, y: number, id: number, down_at: number): boolean {
     const settings = this.settings_();
     if (settings === null) return false;
-    const hit = this.hit(x, y, this.body_.surface);
+    const hit = this.hit(x, y);
     if (!hit) return false;
     if (typeof settings === 'string') {
       this.hint_(settings);
@@ -147,6 +149,7 @@ export class Hand {
       orientation: turn_onto(hit.normal, this.dimension()),
       surface: this.body_.snapshot(),
       depth: Math.min(settings.depth, settings.share_of_thickness * this.thickness(hit)),
+      deeper: 0,
       pushed: 0,
       client: { x, y },
       begun_at: performance.now(),
@@ -169,7 +172,7 @@ export class Hand {
 
   /** Moves the tool along the screen by so many pixels. */
   key_move(right: number, down: number): void {
-    const at = (this.key_place_ ??= this.middle());
+    const at = (this.key_place_ ??= this.on_body(this.middle()));
     at.x += right;
     at.y += down;
     if (this.press_?.id === key_id) this.slide(at.x, at.y);
@@ -182,7 +185,7 @@ export class Hand {
       this.release();
       return;
     }
-    const at = (this.key_place_ ??= this.middle());
+    const at = (this.key_place_ = this.on_body(this.key_place_ ?? this.middle()));
     this.begin(at.x, at.y, key_id, performance.now());
   }
 
@@ -201,6 +204,29 @@ export class Hand {
     const sum: Vec3 = [0, 0, 0];
     for (let i = 0; i < position.length; ++i) sum[i % 3]! += (3 * position[i]!) / position.length;
     return this.view_.eye.project(...sum);
+  }
+
+  /** The same place, or where the body is none the one nearest to it in the window that shows some of it. */
+  private on_body(place: { x: number; y: number }): { x: number; y: number } {
+    if (this.hit(place.x, place.y)) return place;
+    const { position, triangle } = this.body_.surface;
+    const corners = triangle.length > 0 ? triangle : this.body_.boundary;
+    const several = triangle.length > 0 ? 3 : 2;
+    const middle = (first: number) => {
+      const at: Vec3 = [0, 0, 0];
+      for (let k = 0; k < 3 * several; ++k) at[k % 3]! += position[3 * corners[first + Math.floor(k / 3)]! + (k % 3)]! / several;
+      return this.view_.eye.project(...at);
+    };
+    let nearest = Infinity;
+    let found = place;
+    for (let first = 0; first < corners.length; first += several) {
+      const at = middle(first);
+      const away = Math.hypot(at.x - place.x, at.y - place.y);
+      if (away >= nearest || !this.hit(at.x, at.y)) continue;
+      nearest = away;
+      found = at;
+    }
+    return found;
   }
 
   private move(event: PointerEvent): void {
@@ -229,8 +255,17 @@ export class Hand {
     const press = this.press_!;
     const settings = this.settings_();
     press.client = { x, y };
-    if (press.mode === 'press') press.now = this.hit(x, y, press.surface) ?? press.now;
+    if (press.mode === 'press' && this.dimension() === 2) this.slide_in_plane(press);
+    else if (press.mode === 'press') press.now = this.hit(x, y, press.surface) ?? press.now;
     if (settings && typeof settings !== 'string') this.want_press(settings);
+  }
+
+  private slide_in_plane(press: Press): void {
+    const to = this.on_screen_plane(press.client.x, press.client.y, press.start.point);
+    if (!to) return;
+    const place = plus(press.start.point, minus(to, press.plane_start));
+    const nearest = pick_boundary(press.surface.position, this.body_.boundary, place, Infinity, this.has_room());
+    if (nearest) ({ hit: press.now, deeper: press.deeper } = follow_in_plane(press.now, nearest, place));
   }
 
   private up(event: PointerEvent): void {
@@ -277,10 +312,21 @@ export class Hand {
     return this.body_.scene?.dimension ?? 3;
   }
 
-  private hit(x: number, y: number, surface: Surface): Hit | null {
+  /** Whether a tool that touches a point of the boundary is above the floor. */
+  private has_room(): (hit: Hit) => boolean {
+    const settings = this.settings_();
+    if (!settings || typeof settings === 'string' || settings.floor === null) return () => true;
+    const { floor, shape } = settings;
+    return ({ point, normal }) => point[1] + shape.radius * normal[1] > floor + shape.radius;
+  }
+
+  /** Of the body: in space what the pixel shows, in the plane the point of the boundary where one gets to it from outside. */
+  private hit(x: number, y: number, surface: Surface = this.body_.surface): Hit | null {
     if (this.dimension() === 2) {
       const place = this.view_.eye.place_in_plane(x, y);
-      return pick_boundary(surface.position, this.body_.boundary, place, reach_in_plane * this.view_.eye.metres_of_pixel());
+      const { position } = surface;
+      const reach = is_inside(position, this.body_.boundary, place) ? Infinity : reach_in_plane * this.view_.eye.metres_of_pixel();
+      return pick_boundary(position, this.body_.boundary, place, reach, this.has_room());
     }
     const { origin, direction } = this.view_.eye.ray(x, y);
     return pick_surface(surface, origin, direction);
@@ -302,8 +348,8 @@ export class Hand {
     const { radius } = settings.shape;
     let position: Vec3;
     if (press.mode === 'press') {
-      position = pressed_position(press.now.point, press.now.normal, radius, press.depth);
-      this.changed_(press.depth);
+      position = pressed_position(press.now.point, press.now.normal, radius, press.depth + press.deeper);
+      this.changed_(press.depth + press.deeper);
     } else {
       const now = this.on_screen_plane(press.client.x, press.client.y, press.start.point) ?? press.plane_start;
       const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.eye.looking();
@@ -332,7 +378,7 @@ export class Hand {
     if (!at) return;
     this.hover_ = null;
     const settings = this.settings_();
-    const hit = settings === null ? null : this.hit(at.x, at.y, this.body_.surface);
+    const hit = settings === null ? null : this.hit(at.x, at.y);
     this.hovering_ = hit !== null;
     this.view_.pad.style.cursor = this.hovering_ ? 'pointer' : '';
     if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()), settings.clearance);

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { boundary_edges, pick_boundary, pick_surface, thickness_below } from '../src/pick';
+import { boundary_edges, follow_in_plane, is_inside, pick_boundary, pick_surface, thickness_below } from '../src/pick';
 import { disc_profile, dot, minus, norm, normalised, parse_tool, plus, pressed_position, ray_meets_plane, tool_text, turn_onto, turned_depth } from '../src/pose';
 import { frame_at } from '../src/replay_bar';
 import { scale_of } from '../src/view_controls';
@@ -97,6 +97,24 @@ test('the boundary of triangles has the body on its left', () => {
   close(hit!.normal, [0, 1, 0]);
   close(pick_boundary(square, edges, [0.4, 0.96, 0], 0.1)!.normal, [0, 1, 0]); // from inside: still outward
   assert.equal(pick_boundary(square, edges, [0.5, 0.5, 0], 0.1), null);
+});
+
+test('in the plane a press follows the pointer into the body, and stays on its side', () => {
+  const square = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0];
+  const edges = boundary_edges([0, 1, 2, 0, 2, 3], 4);
+  assert.ok(is_inside(square, edges, [0.5, 0.3, 0]) && is_inside(square, edges, [0.01, 0.99, 0]));
+  assert.ok(!is_inside(square, edges, [0.5, 1.01, 0]) && !is_inside(square, edges, [-0.1, 0.5, 0]));
+  let now = pick_boundary(square, edges, [0.5, 0.9, 0], Infinity)!; // from within, as far as it is
+  close(now.point, [0.5, 1, 0]);
+  for (const [x, y, deeper] of [[0.5, 0.8, 0.2], [0.45, 0.7, 0.3], [0.45, 0.2, 0.8], [0.45, 1.1, 0]] as const) {
+    const place: Vec3 = [x, y, 0];
+    const followed = follow_in_plane(now, pick_boundary(square, edges, place, Infinity)!, place);
+    close([followed.deeper], [deeper]);
+    close(followed.hit.normal, [0, 1, 0]);
+    now = followed.hit;
+  }
+  const above = ({ normal }: { normal: Vec3 }) => normal[1] >= 0; // of a body that lies on a floor
+  close(pick_boundary(square, edges, [0.6, 0.1, 0], Infinity, above)!.normal, [1, 0, 0]);
 });
 
 test('a ray meets the plane that it looks at', () => {
