@@ -5,8 +5,9 @@
 namespace palpate {
 namespace {
 
-constexpr double follow_time = 0.015;                 // s
-constexpr std::int64_t most_silence = 1'000'000'000;  // ns, of a pointer that is let down
+constexpr double follow_time = 0.015;  // s
+// Of a pointer that is let down: a browser that draws on a busy processor says nothing for seconds.
+constexpr std::int64_t most_silence = 5'000'000'000;  // ns
 
 }  // namespace
 

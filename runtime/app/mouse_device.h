@@ -14,8 +14,8 @@ namespace palpate {
 /// order low-pass x'' = w^2 (target - x) - 2 w x' (critically damped, w = 1 / 15 ms), so that steps of the
 /// pointer are no kicks. A button and a turn take effect at once. While it is lifted the tool is where the
 /// pointer is, holds nothing, and each tick is told so; let down, it follows from where it was lifted last.
-/// When the viewer is gone, or silent for a second, while the tool is let down, the input is lost: the tool
-/// is lifted, until the next word.
+/// When the viewer is gone, or silent for five seconds, while the tool is let down, the input is lost: the
+/// tool is lifted, until the next word.
 class MouseDevice : public Device {
  public:
   /// `start`: where the tool is until a viewer says more; `rate`: ticks a second.

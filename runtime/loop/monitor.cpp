@@ -60,7 +60,7 @@ std::string_view fault_remedy(Fault fault) {
     case Fault::device_lost:
       return "the device was unplugged; force begins again when it is back";
     case Fault::input_lost:
-      return "what moved the tool is gone";
+      return "the page that moved the tool was closed, or silent for 5 s; the tool was lifted";
     case Fault::stopped:
       return "emergency stop";
     case Fault::none:

@@ -1,7 +1,7 @@
 // The pointer's words on their way to the run, in the thread of the socket: a page that draws a slow picture says nothing meanwhile.
 import type { Point } from './words';
 
-const longest_wait = 250; // [ms] while pressed: the runtime gives up a pointer that is silent for a second
+const longest_wait = 250; // [ms] while pressed: the runtime gives up a pointer that is silent for five
 const longest_silence = 10_000; // [ms] of the page, which then is taken for hung
 
 /**
