@@ -131,6 +131,9 @@ class RecordingWriter {
   /// it was after the last one that did not; nothing may be appended then.
   void checkpoint();
 
+  [[nodiscard]] std::int64_t ticks() const;     ///< in the file
+  [[nodiscard]] std::int64_t pictures() const;  ///< in the file
+
   /// The rest and the index. The bytes of the file depend on what was appended and on when `checkpoint` was
   /// called only. Throws Error as `checkpoint` does.
   void finish();

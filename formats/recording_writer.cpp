@@ -78,17 +78,24 @@ struct RecordingWriter::Impl {
   void append(RecordedChannel channel, double time, const std::string& message) {
     mcap::Chunk& chunk = channel == RecordedChannel::pictures ? pictures : others;
     chunk.append(static_cast<std::uint16_t>(channel), sequence[channel]++, nanoseconds(time), message);
-    if (chunk.bytes() >= enough) writer.write(chunk);
+    if (chunk.bytes() >= enough) write(chunk);
+  }
+
+  void write(mcap::Chunk& chunk) {
+    writer.write(chunk);
+    for (const auto& [channel, count] : sequence)
+      if ((channel == RecordedChannel::pictures) == (&chunk == &pictures)) kept[channel] = count;
   }
 
   void checkpoint() {
-    writer.write(others);
-    writer.write(pictures);
+    write(others);
+    write(pictures);
   }
 
   mcap::Writer writer;
   mcap::Chunk others, pictures;
   std::map<RecordedChannel, std::uint32_t> sequence;  // of the next message
+  std::map<RecordedChannel, std::uint32_t> kept;      // messages that are in the file
 };
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& path, const SessionInfo& info,
@@ -126,6 +133,14 @@ void RecordingWriter::append(const RecordedEvent& event) {
 
 void RecordingWriter::checkpoint() {
   impl_->checkpoint();
+}
+
+std::int64_t RecordingWriter::ticks() const {
+  return impl_->kept[RecordedChannel::tick];
+}
+
+std::int64_t RecordingWriter::pictures() const {
+  return std::int64_t{impl_->kept[RecordedChannel::pictures]} + impl_->kept[RecordedChannel::contacts];
 }
 
 void RecordingWriter::finish() {

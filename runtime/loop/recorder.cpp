@@ -74,24 +74,28 @@ bool Recorder::try_push(RecordedPicture& picture) noexcept {
 }
 
 void Recorder::push(const TickRecord& tick) noexcept {
-  if (!try_push(tick)) ++dropped_;
+  ++ticks_given_.all;
+  if (!try_push(tick)) ++ticks_given_.without_room;
 }
 
 void Recorder::push_picture(RecordedPicture picture) noexcept {
-  if (!try_push(picture)) ++dropped_pictures_;
+  ++pictures_given_.all;
+  if (!try_push(picture)) ++pictures_given_.without_room;
 }
 
 void Recorder::push_waiting(const TickRecord& tick) noexcept {
   waits_ = true;
+  ++ticks_given_.all;
   while (!try_push(tick)) {
-    if (failed_) return push(tick);
+    if (failed_) return;
     std::this_thread::sleep_for(recorder_pause);
   }
 }
 
 void Recorder::push_picture_waiting(RecordedPicture picture) noexcept {
+  ++pictures_given_.all;
   while (!try_push(picture)) {
-    if (failed_) return push_picture(std::move(picture));
+    if (failed_) return;
     std::this_thread::sleep_for(recorder_pause);
   }
 }
@@ -169,6 +173,8 @@ void Recorder::write() noexcept {
 }
 
 void Recorder::fail(const std::exception& reason) noexcept {
+  ticks_given_.kept = writer_.ticks();
+  pictures_given_.kept = writer_.pictures();
   failed_ = true;
   if (on_failure_) on_failure_(as_error(reason));
 }

@@ -54,12 +54,22 @@ class Recorder {
   /// the recording.
   void finish();
 
-  /// Ticks for which there was no room, or no disk any more.
-  [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
-  /// Pictures for which there was no room, or no disk any more.
-  [[nodiscard]] std::int64_t dropped_pictures() const noexcept { return dropped_pictures_; }
+  /// Ticks for which there was no room, or no disk any more: those of the rings too, which it did not reach.
+  [[nodiscard]] std::int64_t dropped() const noexcept { return ticks_given_.dropped(failed_); }
+  /// Pictures likewise.
+  [[nodiscard]] std::int64_t dropped_pictures() const noexcept { return pictures_given_.dropped(failed_); }
 
  private:
+  struct Given {
+    std::atomic<std::int64_t> all = 0;
+    std::atomic<std::int64_t> without_room = 0;
+    std::atomic<std::int64_t> kept = 0;  // once it has failed
+
+    [[nodiscard]] std::int64_t dropped(bool failed) const noexcept {
+      return failed ? all.load() - kept.load() : without_room.load();
+    }
+  };
+
   bool try_push(const TickRecord& tick) noexcept;
   bool try_push(RecordedPicture& picture) noexcept;
   void write() noexcept;
@@ -76,8 +86,7 @@ class Recorder {
   std::atomic<bool> closing_ = false;
   std::atomic<bool> failed_ = false;
   std::exception_ptr failure_;
-  std::atomic<std::int64_t> dropped_ = 0;
-  std::atomic<std::int64_t> dropped_pictures_ = 0;
+  Given ticks_given_, pictures_given_;
   std::atomic<bool> waits_ = false;  // what is pushed
   // Of the thread:
   TickRecord last_;                      // that was written

@@ -635,7 +635,7 @@ class FailedRecording(OutputTest):
         self.wait_for_warning(process, "t.mcap", "File too large")
         report = self.end(process, "File too large")
         told = json.loads(self.runtime("session", "t.mcap", "--json").stdout)
-        self.assertLess(told["ticks"], report["ticks"])
+        self.assertEqual(report["dropped_ticks"], report["ticks"] - told["ticks"])
 
     def test_without_a_clock(self):
         self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1.3\n20,0.5,0.5,1.05\n")
@@ -645,6 +645,10 @@ class FailedRecording(OutputTest):
         report = json.loads((self.folder / "r.json").read_text())
         self.assertEqual(report["ticks"], 20001)
         self.assertIn("File too large", report["recording_failed"])
+        kept = json.loads(self.runtime("session", "t.mcap", "--json").stdout)
+        self.assertGreater(kept["ticks"], 0)
+        self.assertEqual(report["dropped_ticks"], 20001 - kept["ticks"])
+        self.assertIn(f"{report['dropped_ticks']} ticks", result.stderr)
 
     def test_one_that_does_not_fail(self):
         self.assert_done(self.play("--record", "t.mcap", "--report", "r.json"))
