@@ -74,6 +74,37 @@ test('a body at rest stands out from the ground, 3 to 1, in every colouring and 
   assert.deepEqual(page.complaints, []);
 });
 
+test('in plain colours a tool that hovers, presses by 7 and by 17 mm looks each time another way: 25 grey levels around it', async (t) => {
+  const { served } = await serve_block(t);
+  const page = await ready(await visit(t, served.url, small));
+  await until(page, () => window.palpate.state.you === 'controller');
+  await bare(page);
+  const { x, y } = await project(page, place);
+  await page.mouse.move(x, y);
+  await until(page, () => window.palpate.lastFrame.tool[2] < 0.1); // it has come
+  await rest(page);
+  await keep_pixels(page, 'hover');
+  let felt = null;
+  for (const depth of [7, 17]) {
+    await choose(page, 'press', depth / 1000);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    felt = await settled(page);
+    await rest(page);
+    await keep_pixels(page, `${depth} mm`);
+    await page.mouse.up();
+  }
+  const { left, top } = await part(page, 'stage').evaluate((stage) => stage.getBoundingClientRect().toJSON());
+  const centre = await project(page, felt.tool.slice(0, 3));
+  const beside = await project(page, [felt.tool[0] + sphere, felt.tool[1], felt.tool[2]]);
+  const radius = Math.hypot(beside.x - centre.x, beside.y - centre.y);
+  for (const [one, other] of [['hover', '7 mm'], ['7 mm', '17 mm'], ['hover', '17 mm']]) {
+    const seen = await difference(page, one, other, { x: x - left, y: y - top, from: 0, to: 1.9 * radius });
+    t.diagnostic(`${one} and ${other}: ${seen.toFixed(1)} grey levels`);
+    assert.ok(seen >= 25, `${one} and ${other}: ${seen} grey levels`);
+  }
+});
+
 test('a press of 5 mm is seen in the plain view: 12 grey levels around the tool', async (t) => {
   const { served } = await serve_block(t);
   for (const theme of ['dark', 'light']) {

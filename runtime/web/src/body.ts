@@ -15,7 +15,7 @@ import {
 } from 'three';
 import { BodyMaterial } from './body_material';
 import { field_traits, type Field, type SequentialMap } from './colours';
-import { displacements, fill_field, usual_largest } from './field';
+import { displacements, fill_dent, fill_field, usual_largest } from './field';
 import type { Light } from './light';
 import { boundary_edges, type Hit, type Surface } from './pick';
 import { Interior } from './interior';
@@ -39,6 +39,8 @@ export class Body {
   /** Seen is rest + scale * u. */
   scale = 1;
   field: Field = 'none';
+  /** Of the tool [m]: a dent is told by it. */
+  tool_size = 1;
   /** Around what is seen. */
   readonly box = new Box3();
   /** What is seen now, with all that a pointer may touch. */
@@ -51,6 +53,7 @@ export class Body {
   private frame_: Frame | null = null;
   private topology_: Topology | null = null;
   private u_ = new Float32Array(0);
+  private untouched_ = new Float32Array(0); // u of the scene's nodes when the tool was last away
   private value_ = new Float32Array(0);
   private known_ = new Float32Array(0);
   private placed_: { topology: Topology | null; version: number; scale: number } = {
@@ -138,6 +141,7 @@ export class Body {
     this.patch_ = null;
     this.frame_ = null;
     this.interior_.take(scene);
+    this.untouched_ = new Float32Array(scene.position.length);
     this.material_.set_flat(scene.dimension === 2);
     this.rebuild();
   }
@@ -162,6 +166,8 @@ export class Body {
       const largest = fill_field(this.field, this.frame_, topology, this.u_, this.value_, this.known_);
       this.shown.largest = largest;
       this.shown.usual = usual_largest(this.value_, this.known_, topology.area, largest, field_traits[this.field].cut);
+      if (Math.hypot(...this.frame_.force) === 0) this.untouched_.set(this.u_.subarray(0, this.untouched_.length));
+      else if (this.field === 'none' && this.scene_.dimension === 3) fill_dent(this.frame_, topology, this.u_, this.untouched_, this.tool_size, this.value_);
     } else {
       this.u_.fill(0);
       this.known_.fill(this.field === 'none' ? 1 : 0);

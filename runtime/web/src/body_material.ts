@@ -58,7 +58,7 @@ void main() {
 }`;
 
 const fragment = /* glsl */ `
-varying vec4 v_shown; // number, 1 where it is known, 1 where it is held, material
+varying vec4 v_shown; // number (in the plain picture how deep, of the tool's size), 1 where it is known, 1 where it is held, material
 varying vec3 v_normal, v_place, v_world;
 uniform sampler2D colour_map, materials;
 uniform vec2 range;
@@ -79,7 +79,7 @@ float share_of(float value) {
 
 vec3 own_colour() {
 #if COLOURING == 0
-  return tissue;
+  return tissue * mix(vec3(0.10, 0.06, 0.05), vec3(1.0), exp(-5.0 * v_shown.x)); // darker where it is pressed in
 #elif COLOURING == 2
   return texture2D(materials, vec2((floor(v_shown.w + 0.5) + 0.5) / 256.0, 0.5)).rgb;
 #else

@@ -105,6 +105,7 @@ export class Picture {
     if (shape === this.shape_) return;
     this.shape_ = shape;
     this.tool_.take_shape(parse_tool(tool), model.size, model.dimension);
+    this.body.tool_size = this.tool_.radius;
     this.view.draw();
   }
 

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { displacements, fill_field } from '../src/field';
+import { displacements, fill_dent, fill_field } from '../src/field';
 import { boundary_edges } from '../src/pick';
 import { make_topology, vertex_normals } from '../src/topology';
 import type { Frame, Patch, Scene } from '../src/wire';
@@ -160,4 +160,21 @@ test('magnitudes', () => {
   const largest = fill_field('magnitude', frame, topology, u, value, known);
   assert.ok(Math.abs(largest - 0.5 * Math.hypot(21, 22, 23)) < 1e-4);
   assert.ok(Math.abs(value[1]! - 0.5 * Math.hypot(3, 4, 5)) < 1e-5);
+});
+
+test('a dent is how far nodes have gone with the force since the tool was away, near the tool', () => {
+  const topology = make_topology(cube, null);
+  const fell = Float32Array.from({ length: 24 }, (_, i) => (i % 3 === 2 ? -3 : 0)); // all of it, before the tool came
+  const u = fell.slice();
+  u[3 * 7 + 2]! -= 0.8; // then the corner (1, 1, 1) was pressed
+  const frame = { force: [0, 0, -2], tool: Float32Array.from([1, 1, -2.8, 0, 0, 0, 1]) } as unknown as Frame;
+  const value = new Float32Array(topology.nodes);
+  fill_dent(frame, topology, u, fell, 10, value);
+  assert.ok(Math.abs(value[7]! - 0.07) < 1e-6, `${value[7]}`); // (0.8 - 0.1) of 10
+  assert.ok([...value].slice(0, 7).every((one) => one === 0));
+  fill_dent(frame, topology, u, fell, 0.1, value);
+  assert.ok(value[7]! < 7 && value[7]! > 1, `${value[7]}`);
+  frame.tool[0] = 5; // far from there
+  fill_dent(frame, topology, u, fell, 0.1, value);
+  assert.ok(value[7]! < 1e-2, `${value[7]}`);
 });
