@@ -154,7 +154,7 @@ test('a press begins no deeper than a quarter of the thickness, unless it was ty
     await page.mouse.move(x, y);
     await page.mouse.down();
     await until(page, () => /mm$/.test(document.querySelector('[data-testid="depth-now"]').innerText));
-    const depth = parseFloat(await part(page, 'depth-now').innerText());
+    const depth = parseFloat((await part(page, 'depth-now').innerText()).replace('asked', ''));
     await page.mouse.up();
     return depth;
   };

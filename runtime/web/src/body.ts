@@ -48,6 +48,9 @@ export class Body {
   /** In the plane: the boundary, the body on its left, of the surface's vertices. */
   boundary: Uint32Array = new Uint32Array(0);
 
+  /** Of the surface's vertices, of the body at rest. */
+  rest_normal = new Float32Array(0);
+
   private scene_: Scene | null = null;
   private patch_: Patch | null = null;
   private frame_: Frame | null = null;
@@ -277,6 +280,9 @@ export class Body {
 
     const normal = this.attribute('normal').array as Float32Array;
     this.surface = { position: position.array as Float32Array, normal, triangle: topology.triangle, shows: this.shows };
+    this.rest_normal = new Float32Array(normal.length);
+    const rest = Float32Array.from({ length: 3 * vertices }, (_, i) => topology.rest[3 * topology.node[Math.floor(i / 3)]! + (i % 3)]!);
+    vertex_normals(rest, topology.triangle, this.rest_normal);
     this.boundary = new Uint32Array(0);
     if (this.scene_.dimension === 2) {
       this.boundary =

@@ -93,7 +93,13 @@ export class Eye {
   set_floor(height: number | null): void {
     if (height === this.floor_) return;
     this.floor_ = height;
+    this.stay_above();
     if (this.is_fitted_) this.fit();
+  }
+
+  /** Who looks stays above the floor. */
+  private stay_above(): void {
+    this.controls_.maxPolarAngle = this.floor_ === null || this.is_flat ? Math.PI : 0.5 * Math.PI;
   }
 
   set_upright(upright: Upright): void {
@@ -326,6 +332,7 @@ export class Eye {
     this.controls_.dispose();
     this.controls_ = this.make_controls();
     this.controls_.target.copy(target);
+    this.stay_above();
   }
 
   private make_controls(): OrbitControls {

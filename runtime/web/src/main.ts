@@ -10,7 +10,7 @@ import { History } from './history';
 import { as_hash, keep, keep_theme, kept_of, kept_theme, of_hash, type Kept } from './kept';
 import { on_keys } from './keyboard';
 import { near_limit } from './live_controls';
-import { show_light } from './range_light';
+import { show_light, turned_beside } from './range_light';
 import { LiveSource, socket_url } from './live_source';
 import { Gallery, show_way_back } from './gallery';
 import { show_felt, show_timing, type Felt } from './numbers';
@@ -228,9 +228,17 @@ class Page implements Listener {
     show_told(told_of(state, this.mode_, this.lost_));
     if (!state?.model) return;
     this.run_.show(state, this.mode_, this.lost_ === '');
-    show_light(state);
+    this.show_light(state);
     part('hand').hidden = !this.is_hand();
     document.body.classList.toggle('lost', this.lost_ !== '');
+  }
+
+  private show_light(state: State): void {
+    const { body, frame } = this.picture_;
+    const is_pressed = frame !== null && frame.contact.length > 0 && !holds(frame);
+    // In the plane, and drawn larger than it is, the page does not know better than the run.
+    const knows = state.model.dimension === 3 && body.scale === 1;
+    show_light(state, knows ? turned_beside(body.rest_normal, body.surface, is_pressed ? frame.tool : null, body.tool_size) : Infinity);
   }
 
   // --- to the run ---
@@ -272,7 +280,8 @@ class Page implements Listener {
   }
 
   private show_hand_depth(depth: number | null): void {
-    write(part('depth-now'), depth === null ? '' : `${(1000 * depth).toFixed(2)} mm`);
+    if (depth !== null) part('first-hint').hidden = true;
+    write(part('depth-now'), depth === null ? '' : `asked ${(1000 * depth).toFixed(2)} mm`);
   }
 
   private listen(): void {

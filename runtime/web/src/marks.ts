@@ -63,6 +63,7 @@ export class Marks {
       group.querySelector('line')!.setAttribute('y2', y.toFixed(1));
       group.querySelector('text')!.setAttribute('x', (1.42 * x).toFixed(1));
       group.querySelector('text')!.setAttribute('y', (1.42 * y + 4).toFixed(1));
+      group.style.visibility = this.eye_.is_flat && name === 'z' ? 'hidden' : ''; // it points at who looks
       group.style.opacity = deep > 0.6 ? '0.55' : '1';
     }
   }

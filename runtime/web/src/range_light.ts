@@ -1,9 +1,11 @@
 // Whether small strain still holds: how far the surface has turned, against what was studied.
 import { part, write } from './dom';
+import type { Surface } from './pick';
 import type { State } from './words';
 
 export type Light = 'good' | 'near' | 'over';
 
+const dent_reach = 4; // sizes of the tool
 const degrees = 180 / Math.PI;
 
 /** Good up to half of the rotation up to which forces were found right within 5 %; null where nothing is known. */
@@ -13,23 +15,42 @@ export function light_of(change: State['change'], studied: number | null | undef
   return change.rotation > 0.5 * studied ? 'near' : 'good';
 }
 
+/**
+ * How far the surface has turned beside the dent of a tool of this size [m], where `tool` is null all of it [rad]: the largest angle of
+ * a vertex normal from where it was. Within a dent all turns, steeply, and small strain bears that.
+ */
+export function turned_beside(rest_normal: ArrayLike<number>, { position, normal }: Surface, tool: ArrayLike<number> | null, size: number): number {
+  const reach = dent_reach * size;
+  let least = 1; // cosine
+  for (let i = 0; i < normal.length; i += 3) {
+    const cosine = rest_normal[i]! * normal[i]! + rest_normal[i + 1]! * normal[i + 1]! + rest_normal[i + 2]! * normal[i + 2]!;
+    if (cosine >= least) continue;
+    if (tool && Math.hypot(position[i]! - tool[0]!, position[i + 1]! - tool[1]!, position[i + 2]! - tool[2]!) < reach) continue;
+    least = cosine;
+  }
+  return Math.acos(Math.max(-1, least));
+}
+
 /** What it means, with the numbers, and what to do. */
 export function light_title(light: Light, change: NonNullable<State['change']>, studied: number, is_warped: boolean): string {
   const strain = (100 * change.strain).toFixed(0);
-  const range = `Largest rotation of the surface; its largest strain is ${strain} %. Forces were found right within 5 % up to a rotation of ${(degrees * studied).toFixed(0)}°`;
+  const range = `Largest rotation of the surface beside the dent; its largest strain is ${strain} %. Forces were found right within 5 % up to a rotation of ${(degrees * studied).toFixed(0)}°`;
   if (light === 'good') return `${range}.`;
   if (light === 'near') return `${range}, of which this is more than half.`;
   return `${range}: for this one ${is_warped ? '' : 'turn on Warp, or '}play with --solver corotational.`;
 }
 
-/** The light beside the contacts. */
-export function show_light({ change, model, settings }: State): void {
+/** The light beside the contacts, and what it means where it is not green; `beside` is what turned_beside has. */
+export function show_light({ change: all, model, settings }: State, beside: number): void {
+  const change = all ? { ...all, rotation: Math.min(all.rotation, beside) } : all;
   const light = light_of(change, model.studied_rotation);
   const shown = part('range-light');
   shown.hidden = light === null;
+  part('range-note').hidden = light === null || light === 'good';
   if (light === null || !change || !model.studied_rotation) return;
   shown.dataset.light = light;
-  write(shown, `● ${(degrees * change.rotation).toFixed(0)}°`);
+  write(shown, `● turned ${(degrees * change.rotation).toFixed(0)}°`);
+  write(part('range-note'), light_title(light, change, model.studied_rotation, settings.warp === 'yes'));
   shown.title = light_title(light, change, model.studied_rotation, settings.warp === 'yes');
   shown.ariaLabel = `${light === 'good' ? 'within' : light === 'near' ? 'near the end of' : 'beyond'} what was studied: ${shown.title}`;
 }

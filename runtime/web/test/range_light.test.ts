@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { light_of, light_title } from '../src/range_light';
+import { light_of, light_title, turned_beside } from '../src/range_light';
 
 const turned = (degrees: number) => ({ rotation: (degrees * Math.PI) / 180, strain: 0.034 });
 const studied = (18 * Math.PI) / 180;
@@ -26,4 +26,16 @@ test('it says the numbers and what to do', () => {
   assert.match(light_title('over', turned(30), studied, false), /turn on Warp/);
   assert.doesNotMatch(light_title('over', turned(95), studied, true), /--warp/);
   assert.match(light_title('over', turned(95), studied, true), /--solver corotational/);
+});
+
+test('what turns within the dent of a tool does not count, and what turns beside it does', () => {
+  const up = [0, 0, 1];
+  const steep = [Math.sin(1), 0, Math.cos(1)];
+  const bent = [Math.sin(0.2), 0, Math.cos(0.2)];
+  const rest = [...up, ...up, ...up];
+  const surface = { position: [0.01, 0, 0, 0.05, 0, 0, 0.1, 0, 0], normal: [...steep, ...up, ...bent], triangle: [] };
+  const near = (a: number, b: number) => assert.ok(Math.abs(a - b) < 1e-12, `${a} is not ${b}`);
+  near(turned_beside(rest, surface, null, 0.01), 1);
+  near(turned_beside(rest, surface, [0, 0, 0], 0.01), 0.2);
+  near(turned_beside(rest, surface, [0, 0, 0], 0.001), 1);
 });
