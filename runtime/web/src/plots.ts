@@ -37,6 +37,7 @@ interface Window {
 class TimePlot {
   private readonly plot_: uPlot;
   private prefix_: [number, string] = [1, ''];
+  private is_empty_ = true; // nothing but 0, which has no scale
   private marked_: number[] = []; // times of best efforts [s]
 
   constructor(
@@ -61,7 +62,7 @@ class TimePlot {
         scales: { x: { time: false, auto: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => padded(low, high) } },
         axes: [
           { ...axis, size: 20 * rem(), gap: 4, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
-          { ...axis, size: 46 * rem(), gap: 3, space: 22 * rem(), values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
+          { ...axis, size: 46 * rem(), gap: 3, space: 22 * rem(), values: (_, ticks) => ticks.map((tick) => (this.is_empty_ && tick !== 0 ? '' : short_number(tick / this.prefix_[0]))) },
         ],
         series: [
           {},
@@ -110,6 +111,7 @@ class TimePlot {
     if (data[0].length === 0) data.forEach((row, k) => row.push(k === 0 ? window.from : null));
     let largest = 0;
     for (const row of data.slice(1)) for (const value of row) largest = Math.max(largest, Math.abs(value ?? 0));
+    this.is_empty_ = largest === 0;
     this.prefix_ = si_prefix(largest);
     this.plot_.batch(() => {
       this.plot_.setData(data as uPlot.AlignedData, false);
