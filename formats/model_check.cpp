@@ -294,4 +294,18 @@ void check_model(const Model& model, const std::string& where) {
   if (model.warp.any()) check_warp(model, where);
 }
 
+std::string rest_warning(const Model& model) {
+  Eigen::AlignedBox3d box;
+  double moved = 0.0;
+  for (const Vec3& x : model.mesh.nodes) box.extend(x);
+  for (const Vec3& u : model.rest_displacement) moved = std::max(moved, u.norm());
+  const double size = box.isEmpty() ? 0.0 : box.diagonal().norm();
+  if (moved <= small_strain * size) return {};
+  return fmt::format(
+      "at rest the loads move the body by up to {:.3g} m, more than a tenth of its size, {:.3g} m: that is "
+      "beyond "
+      "small strain, and its shape and forces are wrong; check youngs_modulus, which is in Pa, and [[load]]",
+      moved, size);
+}
+
 }  // namespace palpate

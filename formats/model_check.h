@@ -76,4 +76,10 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
 /// Throws Error (where = `where`) naming the field.
 void check_model(const Model& model, const std::string& where);
 
+/// Share of the body's size: the largest displacement that linear elasticity is for.
+inline constexpr double small_strain = 0.1;
+
+/// Whether loads take the body at rest beyond small strain, and what is probably wrong then; else empty.
+[[nodiscard]] std::string rest_warning(const Model& model);
+
 }  // namespace palpate

@@ -16,6 +16,7 @@
 #include "base/limits/child_seal.h"
 #include "base/parallel.h"
 #include "formats/begun_model.h"
+#include "formats/model_check.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/outputs/part_files.h"
@@ -764,6 +765,7 @@ bool Bake::describe() {
   model_.stored_nodes = stored_as_.nodes;
   model_.rest_force = loads_;
   model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
+  if (const std::string warning = rest_warning(model_); !warning.empty()) progress_.warn(warning);
   if (plans_.compression)
     model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
   const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, team_,

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/printable.h"
+#include "formats/model_check.h"
 #include "meshes/material_fields.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/numerics/precision.h"
@@ -207,6 +208,8 @@ std::string inspect(const Model& model) {
   text += fmt::format("  analysis          {}\n", analysis_text(model));
   text += materials_text(model);
   text += rest_text(model);
+  if (const std::string warning = rest_warning(model); !warning.empty())
+    text += "    WARNING         " + warning + "\n";
   if (model.scope == Scope::none) {
     text += "  Green's functions none: for solvers that need none\n";
   } else if (model.compressed != nullptr) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/printable.h"
+#include "formats/model_check.h"
 #include "formats/model_file.h"
 #include "precompute/machine/blas_room.h"
 #include "precompute/numerics/assembly.h"
@@ -253,6 +254,7 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
                       check.name, check.error));
     }
   }
+  if (const std::string warning = rest_warning(model); !warning.empty()) report.warnings.push_back(warning);
   report.differences = description_differences(model, file);
   report.stale = stale_sources(model, file);
   return report;

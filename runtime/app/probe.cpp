@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/json_text.h"
 #include "base/program.h"
+#include "formats/model_check.h"
 #include "meshes/node_vectors.h"
 #include "runtime/app/probe_field.h"
 #include "runtime/body/prescribed_nodes.h"
@@ -18,9 +19,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double small_strain =
-    0.1;  // of the body's size: the largest displacement that linear elasticity is for
 
 /// What is told of one node.
 struct Answer {

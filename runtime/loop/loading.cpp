@@ -14,6 +14,7 @@
 #include "base/printable.h"
 #include "base/program.h"
 #include "base/regular_file.h"
+#include "formats/model_check.h"
 #include "formats/model_file.h"
 #include "runtime/body/scaled_model.h"
 #include "runtime/live/live_model.h"
@@ -108,6 +109,8 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     model = live_model(std::move(model), *live, options.live);
     return {std::move(model), std::move(live)};
   }
+  if (const std::string warning = rest_warning(model); !warning.empty())
+    warn_once(file.string() + ": " + warning);
   if (options.warp) {
     return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   }

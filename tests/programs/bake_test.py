@@ -454,6 +454,20 @@ class Stale(ProgramTest):
             self.assert_refused(run(RUNTIME, "probe", file, "--node", "1", "--displace", "0,0,1"), file.name, piece)
 
 
+class RestState(ProgramTest):
+    def test_beyond_small_strain_is_told(self):
+        """Young's modulus in kPa, where Pa are meant: a body of 1 m sinks by metres."""
+        for youngs_modulus, told in (("5.0", True), ("5.0e6", False)):
+            text = cube_toml(2).replace("youngs_modulus = 1.0", f"youngs_modulus = {youngs_modulus}") + "[[load]]\ngravity = [0, 0, -9.81]\n"
+            model = self.write("weak.toml", text)
+            baked = run(PRECOMPUTE, model, "-o", "weak.palpate.hdf", "--force", cwd=self.folder)
+            touch = self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,3\n")
+            play = run(RUNTIME, "play", "weak.palpate.hdf", "--device", f"script:{touch}", "--fast", cwd=self.folder)
+            words = (baked.stderr, play.stderr, *(run(PRECOMPUTE, command, "weak.palpate.hdf", cwd=self.folder).stdout for command in ("inspect", "verify")))
+            for said in words:
+                self.assertEqual("beyond small strain" in said, told, said)
+
+
 class BadDescriptions(ProgramTest):
     def refuse(self, text, *pieces):
         model = self.write("model.toml", text)
