@@ -88,11 +88,15 @@ void print_text(const RecordingFile& recording, const SessionSummary& s, Ending 
       static_cast<double>(s.in_contact) / static_cast<double>(info.rate));
   say(stdout, "largest force    {:.6g} N at {:.3f} s\n", s.largest_force, s.largest_force_time);
   say(stdout, "largest shown    {:.6g} N at {:.3f} s\n", s.largest_shown, s.largest_shown_time);
-  say(stdout, "step             median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
-      microseconds(s.compute.percentile(0.5)), microseconds(s.compute.percentile(0.999)),
-      microseconds(s.compute.worst()));
-  say(stdout, "deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
-      microseconds(s.worst_lateness));
+  if (s.compute.worst() == 0) {
+    say(stdout, "step             not timed, as the run had no clock (--fast)\n");
+  } else {
+    say(stdout, "step             median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
+        microseconds(s.compute.percentile(0.5)), microseconds(s.compute.percentile(0.999)),
+        microseconds(s.compute.worst()));
+    say(stdout, "deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
+        microseconds(s.worst_lateness));
+  }
   say(stdout, "faults           {}\n", faults_text(s));
   say(stdout, "status           {}\n", status_text(s));
   if (s.best_effort.ticks > 0) say(stdout, "best effort      {}\n", in_words(s.best_effort, s.ticks));
