@@ -2,11 +2,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/command_pages.h"
 #include "base/command_tree.h"
+#include "base/spelling.h"
 
 namespace palpate {
 
@@ -103,6 +106,22 @@ inline const CLI::App* find_command(const CLI::App& app, const std::string& name
   const auto commands =
       app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
   return commands.empty() ? nullptr : commands.front();
+}
+
+/// "Did you mean --device? " where a word that is no option of the command was probably meant as one; else
+/// nothing.
+inline std::string meant_option(const CLI::App& app, int argc, char** argv) {
+  const CommandText command =
+      command_tree(app.get_subcommands().empty() ? app : *app.get_subcommands().front());
+  std::vector<std::string_view> known;
+  for (const ArgumentText& option : command.options)
+    known.insert(known.end(), option.names.begin(), option.names.end());
+  for (int k = 1; k < argc; ++k) {
+    const std::string_view argument = argv[k], word = argument.substr(0, argument.find('='));
+    if (!word.starts_with("--") || std::ranges::find(known, word) != known.end()) continue;
+    if (const auto option = meant(word, known)) return "Did you mean " + *option + "? ";
+  }
+  return "";
 }
 
 /// What `help` was given.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
+#include <utility>
 
 namespace palpate {
 namespace {
@@ -87,8 +89,16 @@ CommandText command_tree(const CLI::App& app) {
                    .commands = {}};
   for (const CLI::Option* option : app.get_options())
     (option->nonpositional() ? text.options : text.positionals).push_back(argument_text(*option));
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    text.commands.push_back(command_tree(*command));
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    CommandText inner = command_tree(*command);
+    if (command->get_name().empty()) {  // a group of options
+      std::ranges::copy_if(inner.options, std::back_inserter(text.options), [](const ArgumentText& option) {
+        return option.names.back() != "--help";  // each group has one of its own
+      });
+    } else {
+      text.commands.push_back(std::move(inner));
+    }
+  }
   return text;
 }
 

@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-/// The fewest letters that are to be replaced, added or left out to make one word of the other
-/// (Levenshtein's distance).
+/// The fewest letters that are to be replaced, added or left out, or exchanged with their neighbour, to make
+/// one word of the other (the distance of Damerau and Levenshtein, no part changed twice).
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
 /// The known word, of at least one, that `word` is probably a slip of the pen from: at most one letter in

@@ -210,8 +210,8 @@ CLI::App* add_join(CLI::App& app, Arguments& arguments) {
   add_report(*command, options);
   command->add_flag("--keep-parts", options.keep_parts, "leave the parts there once the file is written");
   command->footer(
-      "The file has the bytes that one run without parts would have written. A run that was interrupted or "
-      "killed is resumed by the same command.\n"
+      "The file has the bytes that one run without parts would have written. A run that was\n"
+      "interrupted or killed is resumed by the same command.\n"
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml --part 1/2\n"
       "  palpate-precompute meshes/models/cube/model.toml --part 2/2    on another machine\n"
@@ -225,8 +225,8 @@ CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
       ->required()
       ->type_name("");
   command->footer(
-      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics, warping and "
-      "source files.\n"
+      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics, warping\n"
+      "and source files.\n"
       "Example:\n"
       "  palpate-precompute inspect cube.palpate.hdf");
   return command;
@@ -319,7 +319,7 @@ int run_commands(int argc, char** argv) {
     if (app.get_subcommands().empty()) check_draft_options(arguments.model, arguments.draft);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return tell_usage(error.what(), usage_hint(app, argc > 1 ? argv[1] : ""));
+    return tell_usage(error.what(), meant_option(app, argc, argv) + usage_hint(app, argc > 1 ? argv[1] : ""));
   }
   if (inspect_command->parsed()) {
     say_lines(stdout, inspect(load_model(arguments.file)));

@@ -333,7 +333,8 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();
     const std::string command = of_command ? app.get_subcommands().front()->get_name() + " " : "";
-    return tell_usage(error.what(), "See palpate-runtime " + command + "--help");
+    return tell_usage(error.what(),
+                      meant_option(app, argc, argv) + "See palpate-runtime " + command + "--help");
   }
 }
 

@@ -22,7 +22,7 @@ def commands(program):
 def options(program, command):
     """What the help page of a command has: names of options."""
     page = run(program, *command.split(), "--help").stdout
-    names = re.findall(r"^  (-[\w-]+(?:,-[\w-]+)*)", page, re.MULTILINE)
+    names = re.findall(r"^ {2,4}(-[\w-]+(?:,-[\w-]+)*)", page, re.MULTILINE)  # 4: of a group
     return {name for line in names for name in line.split(",")} | {"--help", "-h"}
 
 

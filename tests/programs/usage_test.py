@@ -98,7 +98,8 @@ class Usage(ProgramTest):
                                   (("compare", "a.palpate.hdf"), ("B", "compare --help")),
                                   (("--jobs", "0", "x.toml"), ("--jobs", "--help")),
                                   (("verfy", "x.palpate.hdf"), ("palpate-precompute verify?",)),
-                                  (("inspekt",), ("palpate-precompute inspect?",)),
+                                  (("inspekt",), ("palpate-precompute inspect?",)), (("--out=x", "m.toml"), ("--out",)),
+                                  (("--forse", "m.toml"), ("Did you mean --force?",)),
                                   (("help", "bogus"), ("there is no command 'bogus'",))):
             with self.subTest(arguments=arguments):
                 self.assert_usage(run(PRECOMPUTE, *arguments, cwd=self.folder), *pieces)
@@ -106,10 +107,20 @@ class Usage(ProgramTest):
     def test_runtime_names_the_command_that_is_meant(self):
         for word, piece in (("liver.palpate.hdf", "palpate-runtime play liver.palpate.hdf --view"),
                             ("touch.mcap", "palpate-runtime view touch.mcap"), ("model.toml", "palpate-precompute model.toml"),
-                            ("pley", "palpate-runtime play?"), ("sesion", "palpate-runtime session?"),
+                            ("pley", "palpate-runtime play?"), ("plya", "palpate-runtime play?"), ("sesion", "palpate-runtime session?"),
                             ("bogus", "play, view, probe, session, export or devices")):
             with self.subTest(word=word):
                 self.assert_usage(run(RUNTIME, word), f"'{word}'", piece)
+
+    def test_runtime_names_the_option_that_is_meant(self):
+        for arguments, option in ((("play", "b.palpate.hdf", "--devise", "mouse"), "--device"), (("export", "a.mcap", "--hmtl=a.html"), "--html")):
+            self.assert_usage(run(RUNTIME, *arguments), f"Did you mean {option}? See palpate-runtime {arguments[0]} --help")
+
+    def test_lines_of_help_are_short(self):
+        for program in (PRECOMPUTE, RUNTIME):
+            for command in re.findall(r"^  ([a-z]+) ", run(program, "--help").stdout, re.MULTILINE):
+                for line in run(program, command, "--help").stdout.splitlines():
+                    self.assertLessEqual(len(line), 110)
 
     def test_help_is_a_command_too(self):
         for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare")),
