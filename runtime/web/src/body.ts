@@ -13,9 +13,9 @@ import {
   PointsMaterial,
   type Vector4,
 } from 'three';
-import { BodyMaterial } from './body_material';
+import { BodyMaterial, type Colours } from './body_material';
 import { field_traits, type Field, type SequentialMap } from './colours';
-import { displacements, fill_dent, fill_field, usual_largest } from './field';
+import { displacements, fill_dent, fill_field, mean_values, usual_largest } from './field';
 import type { Light } from './light';
 import { boundary_edges, type Hit, type Surface } from './pick';
 import { Interior } from './interior';
@@ -228,6 +228,17 @@ export class Body {
     const is_alone = flat && this.scene_?.triangle.length === 0;
     this.edges_.material.color.set(is_alone ? this.ink : 0x0a0d12);
     this.edges_.material.opacity = is_alone ? 1 : flat ? 0.6 : 0.38;
+  }
+
+  /** What numbers are coloured by. */
+  get colours(): Colours {
+    return this.material_.colours;
+  }
+
+  /** Numbers of places within the body [3 n], put between those of the surface: none is computed there. */
+  numbers_within(places: Float32Array): Float32Array {
+    const { node } = this.topology_!;
+    return mean_values(places, this.surface, Float32Array.from(node, (one) => this.value_[one]!));
   }
 
   /** The number that colours a place of the surface. */

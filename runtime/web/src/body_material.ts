@@ -1,5 +1,5 @@
 // What the body's surface looks like: plain and a little wet, or in colours that say numbers.
-import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, NearestFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, Vector2, Vector4 } from 'three';
+import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, NearestFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, Vector2, Vector4, type IUniform } from 'three';
 import { map_texels, material_colours, tint, tissue, type MapName } from './colours';
 import { light_glsl, seen_glsl, type Light } from './light';
 
@@ -36,6 +36,17 @@ void light_body(vec3 place, vec3 normal, vec3 eye, vec2 open, out vec3 diffuse, 
 }
 `;
 
+/** Where a number lies on its bar; with `range` and `is_log`. */
+export const share_glsl = /* glsl */ `
+float share_of(float value) {
+  if (is_log > 0.5) return value > 0.0 && range.y > 0.0 ? 1.0 + log(value / range.y) / log(1000.0) : 0.0;
+  return (value - range.x) / max(range.y - range.x, 1e-30);
+}
+`;
+
+/** What numbers are coloured by, as uniforms. */
+export type Colours = Record<'colour_map' | 'range' | 'is_log' | 'tint', IUniform>;
+
 const vertex = /* glsl */ `
 attribute vec4 shown;
 varying vec4 v_shown;
@@ -71,12 +82,7 @@ varying vec3 v_diffuse, v_gloss;
 #else
 ${body_light}
 #endif
-
-float share_of(float value) {
-  if (is_log > 0.5) return value > 0.0 && range.y > 0.0 ? 1.0 + log(value / range.y) / log(1000.0) : 0.0;
-  return (value - range.x) / max(range.y - range.x, 1e-30);
-}
-
+${share_glsl}
 vec3 own_colour() {
 #if COLOURING == 0
   return tissue * mix(vec3(0.10, 0.06, 0.05), vec3(1.0), exp(-5.0 * v_shown.x)); // darker where it is pressed in
@@ -162,6 +168,11 @@ export class BodyMaterial extends ShaderMaterial {
       polygonOffsetUnits: 2,
     });
     this.set_map('viridis');
+  }
+
+  get colours(): Colours {
+    const { colour_map, range, is_log, tint } = this.uniforms;
+    return { colour_map: colour_map!, range: range!, is_log: is_log!, tint: tint! };
   }
 
   set(values: Partial<Record<'is_log' | 'shows_held' | 'pixel', number>>): void {

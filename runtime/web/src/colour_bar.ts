@@ -43,13 +43,13 @@ export class ColourBar {
   materials: string[] = [];
   private shown_ = '';
 
-  /** `largest` absolute value in the picture, which may be beyond `high`. */
-  show(field: Field, low: number, high: number, largest: number, colouring: Colouring, moduli: number[]): void {
+  /** `largest` absolute value in the picture, which may be beyond `high`; `where` begins the line below the title. */
+  show(field: Field, low: number, high: number, largest: number, colouring: Colouring, moduli: number[], where: string): void {
     this.scale = make_scale(field, low, high, largest, colouring);
     this.show_materials(field === 'material' ? moduli.map(material_name) : []);
     part('colour-bar').hidden = this.scale === null;
     if (!this.scale) return;
-    write(part('colour-largest'), this.scale.largest);
+    write(part('colour-largest'), where + this.scale.largest);
     part('colour-bar').classList.toggle('cut', this.scale.is_cut);
     part('colour-bar').classList.toggle('both', this.scale.is_cut && low < 0);
     const key = `${field} ${low} ${high} ${colouring.map} ${colouring.is_log}`;

@@ -1,5 +1,6 @@
 // Nodal displacements and the number by which each node is coloured.
 import type { Field } from './colours';
+import type { Surface } from './pick';
 import type { Topology } from './topology';
 import { unknown_stress, type Frame } from './wire';
 
@@ -76,6 +77,37 @@ export function fill_dent(frame: Frame, topology: Topology, u: Float32Array, unt
     const away = Math.hypot(...[0, 1, 2].map((k) => topology.rest[3 * i + k]! + u[3 * i + k]! - frame.tool[k]!));
     value[i] = Math.max(0, value[i]! - mean) / (size * (1 + (away / (4 * size)) ** 4));
   }
+}
+
+/**
+ * At places within a closed surface [3 n] what lies between the values of its vertices: means over all directions, weighted by one
+ * over the way to the surface (mean value coordinates, Ju, Schaefer and Warren 2005), a point a triangle.
+ */
+export function mean_values(places: ArrayLike<number>, { position: p, triangle }: Surface, value: ArrayLike<number>): Float32Array {
+  const count = triangle.length / 3;
+  const middle = new Float64Array(3 * count);
+  const area = new Float64Array(3 * count); // outward, half as long as the cross product
+  const mean = new Float64Array(count);
+  for (let t = 0; t < count; ++t) {
+    const [a, b, c] = [3 * triangle[3 * t]!, 3 * triangle[3 * t + 1]!, 3 * triangle[3 * t + 2]!];
+    for (let k = 0; k < 3; ++k) {
+      const [m, n] = [(k + 1) % 3, (k + 2) % 3];
+      middle[3 * t + k] = (p[a + k]! + p[b + k]! + p[c + k]!) / 3;
+      area[3 * t + k] = 0.5 * ((p[b + m]! - p[a + m]!) * (p[c + n]! - p[a + n]!) - (p[b + n]! - p[a + n]!) * (p[c + m]! - p[a + m]!));
+    }
+    mean[t] = (value[a / 3]! + value[b / 3]! + value[c / 3]!) / 3;
+  }
+  return Float32Array.from({ length: places.length / 3 }, (_, i) => {
+    let [sum, whole] = [0, 0];
+    for (let t = 0; t < count; ++t) {
+      const x = middle[3 * t]! - places[3 * i]!, y = middle[3 * t + 1]! - places[3 * i + 1]!, z = middle[3 * t + 2]! - places[3 * i + 2]!;
+      const away2 = x * x + y * y + z * z + 1e-30;
+      const weight = Math.abs(area[3 * t]! * x + area[3 * t + 1]! * y + area[3 * t + 2]! * z) / (away2 * away2); // without its sign: a place just outside has what is beside it
+      sum += weight * mean[t]!;
+      whole += weight;
+    }
+    return whole === 0 ? 0 : sum / whole;
+  });
 }
 
 const per_octave = 16;

@@ -6,7 +6,7 @@ import { ColourBar } from './colour_bar';
 import { field_traits, log_span, Range, type Field } from './colours';
 import { part, rem } from './dom';
 import { Marks } from './marks';
-import { Section, type SectionAxis } from './section';
+import { Section, type Filling, type SectionAxis } from './section';
 import { parse_tool } from './pose';
 import { ToolView } from './tool';
 import { View } from './view';
@@ -29,8 +29,11 @@ export function looks_same(a: Frame, b: Frame, size: number): boolean {
   return apart < still * size && turned < 1e-3 && pushed <= 2e-3 * force;
 }
 
+/** Displacements within follow those of the surface nearby; stress and pressure are known on the surface alone. */
+const filling_of = (field: Field): Filling => (!field_traits[field].has_range ? 'material' : field_traits[field].unit === 'm' ? 'number' : 'unknown');
+
 export class Picture {
-  private readonly section_ = new Section();
+  private readonly section_: Section = new Section(() => this.body.colours);
   readonly view = new View(part('stage'), this.section_);
   readonly body = new Body(this.view.light, this.section_.cut, this.section_.planes);
   readonly marks: Marks;
@@ -213,13 +216,15 @@ export class Picture {
     const low = field_traits[drawn.field].is_signed ? -high : is_log ? high / log_span : 0;
     const colouring: Colouring = { map: drawn.map, is_log, isolines: drawn.isolines ? 12 : 0 };
     this.body.show_range(low, high, colouring);
+    if (this.section_.is_on) this.section_.fill(filling_of(drawn.field), (places) => this.body.numbers_within(places));
     this.automatic_range = automatic;
     const now = performance.now();
     this.bar_is_new = this.view.drawing.rests || drawn.field !== this.bar_field_ || now - this.bar_at_ > bar_wait;
     if (!this.bar_is_new) return;
     this.bar_at_ = now;
     this.bar_field_ = drawn.field;
-    this.bar.show(drawn.field, low, high, shown.largest, colouring, this.model_?.materials ?? []);
+    const is_surface = this.section_.is_on && filling_of(drawn.field) === 'unknown';
+    this.bar.show(drawn.field, low, high, shown.largest, colouring, this.model_?.materials ?? [], is_surface ? 'surface: ' : '');
   }
   /** The bar is of this picture: numbers that change with each cannot be read, and each costs the page a layout. */
   bar_is_new = true;

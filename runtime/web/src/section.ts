@@ -2,6 +2,7 @@
 import {
   AlwaysStencilFunc,
   BackSide,
+  Box3,
   BufferAttribute,
   BufferGeometry,
   Color,
@@ -19,6 +20,7 @@ import {
   ZeroStencilOp,
   type Side,
 } from 'three';
+import { share_glsl, type Colours } from './body_material';
 import { material_colours } from './colours';
 import type { Vec3 } from './words';
 
@@ -32,6 +34,7 @@ export interface Region {
   inner: { position: BufferAttribute; triangle: Uint32Array } | null;
 }
 
+const sheet_cells = 96; // each way, of what fills the cut
 const nowhere = new Vector4(0, 0, 0, 1);
 
 function counting(side: Side, cut: { value: Vector4 }): ShaderMaterial {
@@ -52,18 +55,37 @@ function counting(side: Side, cut: { value: Vector4 }): ShaderMaterial {
   });
 }
 
-function filling(colour: Color): ShaderMaterial {
+/** How a cut is filled: by material, by the number of the field there, or grey where it is not known within. */
+export type Filling = 'material' | 'number' | 'unknown';
+
+/** `colours`: uniforms of the body's own. */
+function filling(own: Color, colours: Colours): ShaderMaterial {
   return new ShaderMaterial({
-    uniforms: { colour: { value: colour }, pixel: { value: 1 } },
-    vertexShader: 'void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }',
+    uniforms: { ...colours, own: { value: own }, pixel: { value: 1 } },
+    vertexShader: 'attribute float number; varying float v_number; void main() { v_number = number; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }',
     fragmentShader: /* glsl */ `
-      uniform vec3 colour;
-      uniform float pixel;
+      varying float v_number;
+      uniform sampler2D colour_map;
+      uniform vec2 range;
+      uniform vec3 own, tint;
+      uniform float pixel, is_log;
+      ${share_glsl}
+      vec3 fill() {
+#if FILLING == 1
+        return texture2D(colour_map, vec2(clamp(share_of(v_number), 0.0, 1.0) * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
+#elif FILLING == 2
+        return mix(tint * 0.55, own, 0.3); // parts can still be told apart
+#else
+        return own;
+#endif
+      }
       void main() {
+        vec3 colour = fill();
         float line = smoothstep(0.35, 0.6, abs(fract((gl_FragCoord.x - gl_FragCoord.y) / (9.0 * pixel)) - 0.5) * 2.0);
         gl_FragColor = vec4(colour * mix(0.86, 1.0, line), 1.0);
         #include <colorspace_fragment>
       }`,
+    defines: { FILLING: 0 },
     stencilWrite: true,
     stencilFunc: NotEqualStencilFunc,
     stencilRef: 0,
@@ -85,10 +107,12 @@ export class Section {
   private is_flipped_ = false;
   private low_: Vec3 = [0, 0, 0];
   private high_: Vec3 = [1, 1, 1];
-  private readonly sheet_ = new PlaneGeometry(1, 1);
+  private readonly sheet_ = new PlaneGeometry(1, 1, sheet_cells, sheet_cells).setAttribute('number', new BufferAttribute(new Float32Array((sheet_cells + 1) ** 2), 1));
   private readonly fills_: Mesh<PlaneGeometry, ShaderMaterial>[] = [];
   private readonly count_back_ = counting(BackSide, this.cut);
   private readonly count_front_ = counting(FrontSide, this.cut);
+
+  constructor(private readonly colours_: () => Colours) {}
 
   get axis(): SectionAxis {
     return this.axis_;
@@ -134,11 +158,37 @@ export class Section {
         for (const way of [this.count_back_, this.count_front_]) this.add(new Mesh(geometry, way), 10 * k - 1000);
       }
       const colour = regions.length === 1 ? new Color(0x8e4436) : new Color(`rgb(${material_colours[material % material_colours.length]!.join()})`);
-      const fill = new Mesh(this.sheet_, filling(colour));
+      const fill = new Mesh(this.sheet_, filling(colour, this.colours_()));
       this.fills_.push(fill);
       this.add(fill, 10 * k - 999);
     });
     this.place();
+  }
+
+  /** Fills the cut so, with the numbers of places within the body. */
+  fill(filling: Filling, numbers: (places: Float32Array) => Float32Array): void {
+    const defined = { material: 0, number: 1, unknown: 2 }[filling];
+    for (const { material } of this.fills_) {
+      if (material.defines.FILLING !== defined) material.needsUpdate = true;
+      material.defines.FILLING = defined;
+    }
+    const sheet = this.fills_[0];
+    if (filling !== 'number' || !sheet) return;
+    sheet.updateMatrixWorld();
+    const [corner, number] = [this.sheet_.getAttribute('position'), this.sheet_.getAttribute('number')];
+    const [low, high] = [new Vector3(...this.low_), new Vector3(...this.high_)];
+    const around = new Box3(low, high).expandByScalar(0.2 * high.distanceTo(low));
+    const place = new Vector3();
+    const near: number[] = [];
+    const places: number[] = [];
+    for (let k = 0; k < number.count; ++k) {
+      place.fromBufferAttribute(corner, k).applyMatrix4(sheet.matrixWorld);
+      if (!around.containsPoint(place)) continue;
+      near.push(k);
+      places.push(place.x, place.y, place.z);
+    }
+    numbers(Float32Array.from(places)).forEach((value, k) => number.setX(near[k]!, value));
+    number.needsUpdate = true;
   }
 
   /** Before a picture; `pixel` is how many of it are one of the page. */

@@ -11,7 +11,7 @@ const fineness = 2; // pixels of the picture for one of the page, along a side
 
 /** Draws one body after the other: a browser has few drawing contexts. */
 export class SmallPictures {
-  private readonly section_ = new Section();
+  private readonly section_: Section = new Section(() => this.body_.colours);
   private readonly stage_ = document.createElement('div');
   private readonly view_: View;
   private readonly body_: Body;

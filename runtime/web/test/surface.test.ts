@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { displacements, fill_dent, fill_field } from '../src/field';
+import { displacements, fill_dent, fill_field, mean_values } from '../src/field';
 import { boundary_edges } from '../src/pick';
 import { make_topology, vertex_normals } from '../src/topology';
 import type { Frame, Patch, Scene } from '../src/wire';
@@ -177,4 +177,15 @@ test('a dent is how far nodes have gone with the force since the tool was away, 
   frame.tool[0] = 5; // far from there
   fill_dent(frame, topology, u, fell, 0.1, value);
   assert.ok(value[7]! < 1e-2, `${value[7]}`);
+});
+
+test('between the values of a closed surface lie those within', () => {
+  const surface = { position: cube.position, normal: [], triangle: cube.triangle };
+  const at = (x: number, y: number, z: number, value: number[]) => mean_values([x, y, z], surface, value)[0]!;
+  assert.ok(Math.abs(at(0.3, 0.6, 0.2, Array(8).fill(7)) - 7) < 1e-6);
+  const height = [0, 0, 0, 0, 1, 1, 1, 1];
+  assert.ok(Math.abs(at(0.5, 0.5, 0.5, height) - 0.5) < 1e-6);
+  const [low, high] = [at(0.5, 0.5, 0.2, height), at(0.5, 0.5, 0.8, height)];
+  for (const z of [-0.3, -0.01, 1.01, 1.3]) assert.ok(at(0.9, 0.9, z, height) >= 0 && at(0.9, 0.9, z, height) <= 1); // outside
+  assert.ok(low > 0 && low < 0.35 && high > 0.65 && high < 1, `${low} ${high}`);
 });
