@@ -199,7 +199,8 @@ std::string filled_in(std::string_view command, const std::filesystem::path& fil
   std::string text;
   const std::string given = shell_word(file.string()), name = name_without_ending(file);
   while (!command.empty()) {
-    const bool is_file = command.starts_with("FILE"), is_name = command.starts_with("NAME.");
+    const bool is_file = command.starts_with("FILE"),
+               is_name = command.starts_with("NAME") && command.substr(4).starts_with('.');
     if (is_name) {
       const std::size_t end = std::min(command.find_first_of(" ,;"), command.size());
       text += shell_word(name + std::string(command.substr(4, end - 4)));

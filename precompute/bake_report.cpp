@@ -1,6 +1,5 @@
 #include "precompute/bake_report.h"
 
-
 #include <algorithm>
 #include <cstdio>
 #include <fstream>

@@ -43,7 +43,7 @@ UnitGuess unit_of_pixels(double longest_side) {
   return {*read_unit(metres), fmt::format("the body is {} pixels long, and so 10 cm", longest_side)};
 }
 
-/// Of the lengths as they are read: images in millimetres where the header says its unit.
+/// The unit of the lengths as they are read: millimetres for an image whose header says its unit.
 UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
   if (options.unit) {
     LengthUnit given = *options.unit;
