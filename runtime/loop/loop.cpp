@@ -257,16 +257,15 @@ class Loop {
     }
   }
 
-  /// How far the closed contacts press the surface in from where it would be without the tool, at most [m].
+  /// How far the closed contacts press the surface in, at most [m].
   [[nodiscard]] double depth() const noexcept {
     double deepest = 0.0;
     for (const ContactPoint& contact : parts_.state.contacts()) {
       if (contact.force.squaredNorm() == 0.0) continue;
       Vec3 moved = Vec3::Zero();  // inward
       for_each_node(parts_.body, parts_.state.surface.near, contact, [&](Index node, double weight) {
-        const Vec3 untouched = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)] +
-                               parts_.state.surface.motion.untouched(parts_.body, node);
-        moved += weight * (untouched - parts_.state.surface.tree.position(node));
+        const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
+        moved += weight * (rest - parts_.state.surface.tree.position(node));
       });
       deepest =
           std::max(deepest, moved.dot(contact.held ? outward_normal(parts_.state.surface.tree,
