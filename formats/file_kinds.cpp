@@ -14,21 +14,23 @@ namespace palpate {
 namespace {
 
 // With what other formats become one that is read. Each is a line for a shell.
-constexpr std::string_view meshio = "meshio convert --ascii FILE NAME.vtk";
-constexpr std::string_view assimp = "assimp export FILE NAME.stl";
-constexpr std::string_view gmsh = "gmsh -2 FILE -o NAME.stl";
+constexpr std::string_view meshio = "convert it: meshio convert --ascii FILE NAME.vtk";
+constexpr std::string_view assimp = "convert it: assimp export FILE NAME.stl";
+constexpr std::string_view gmsh = "convert it: gmsh -2 FILE -o NAME.stl";
 constexpr std::string_view simple_itk =
-    "python3 -c 'import sys, SimpleITK as s; s.WriteImage(s.ReadImage(sys.argv[1]), sys.argv[2])' FILE "
+    "convert it: python3 -c 'import sys, SimpleITK as s; s.WriteImage(s.ReadImage(sys.argv[1]), "
+    "sys.argv[2])' FILE "
     "NAME.nrrd";
 constexpr std::string_view nibabel =
-    "python3 -c 'import sys, nibabel as n; i = n.load(sys.argv[1]); n.save(n.Nifti1Image(i.dataobj, "
+    "convert it: python3 -c 'import sys, nibabel as n; i = n.load(sys.argv[1]); "
+    "n.save(n.Nifti1Image(i.dataobj, "
     "i.affine), "
     "sys.argv[2])' FILE NAME.nii.gz";
 constexpr std::string_view pyvista_surface =
-    "python3 -c 'import sys, pyvista as p; "
+    "convert it: python3 -c 'import sys, pyvista as p; "
     "p.read(sys.argv[1]).extract_surface().triangulate().save(sys.argv[2])' "
     "FILE NAME.stl";
-constexpr std::string_view magick = "convert FILE NAME.png";
+constexpr std::string_view magick = "convert it: convert FILE NAME.png";
 constexpr std::string_view blender = "open it in Blender and export the body as .stl";
 constexpr std::string_view slicer = "open it in 3D Slicer and save the segmentation as NAME.nrrd";
 
@@ -48,17 +50,18 @@ constexpr auto all_kinds = std::to_array<FileKind>({
     {"a picture", ".pbm ", "picture", ""},
     {"a description", ".toml ", "", ""},
     {"a baked model already", ".hdf ", "",
-     "palpate-runtime play FILE --view shows it, palpate-precompute inspect FILE says what is in it"},
-    {"a recording", ".mcap ", "", "palpate-runtime view FILE shows it"},
+     "to see it: palpate-runtime play FILE --view; what is in it: palpate-precompute inspect FILE"},
+    {"a recording", ".mcap ", "", "to see it: palpate-runtime view FILE"},
     {"a file of HDF5 or MATLAB", ".h5 .hdf5 .mat .med ", "",
      "baked models end in .palpate.hdf; a mesh (.med): meshio convert --ascii FILE NAME.vtk"},
     {"a MetaImage", ".mha .mhd ", "", simple_itk},
-    {"an NRRD image whose voxels are in another file", ".nhdr ", "", "unu save -f nrrd -i FILE -o NAME.nrrd"},
+    {"an NRRD image whose voxels are in another file", ".nhdr ", "",
+     "convert it: unu save -f nrrd -i FILE -o NAME.nrrd"},
     {"an image in two files, of NIfTI or Analyze", ".hdr .img .hdr.gz .img.gz ", "", nibabel},
-    {"an image of FreeSurfer", ".mgz .mgh ", "", "mri_convert FILE NAME.nii.gz"},
-    {"a MINC image", ".mnc ", "", "mnc2nii FILE NAME.nii"},
+    {"an image of FreeSurfer", ".mgz .mgh ", "", "convert it: mri_convert FILE NAME.nii.gz"},
+    {"a MINC image", ".mnc ", "", "convert it: mnc2nii FILE NAME.nii"},
     {"a slice or series in DICOM", ".dcm .ima .dicom ", "",
-     "dcm2niix FOLDER makes one NIfTI image of the series; then segment the organ, in 3D Slicer for "
+     "make a NIfTI image of the series with dcm2niix FOLDER, then segment the organ, in 3D Slicer for "
      "instance"},
     {"a volume mesh of VTK in XML", ".vtu .pvtu ", "", meshio},
     {"a surface of VTK in XML", ".vtp .pvtp ", "", pyvista_surface},
@@ -85,14 +88,14 @@ constexpr auto all_kinds = std::to_array<FileKind>({
     {"a scene in USD", ".usd .usda .usdc .usdz ", "", blender},
     {"a picture in JPEG", ".jpg .jpeg .jfif ", "", magick},
     {"a picture in TIFF", ".tif .tiff ", "",
-     "convert FILE NAME.png for a picture; a stack of slices: 3D Slicer, saved as NAME.nrrd"},
+     "a picture: convert FILE NAME.png; a stack of slices: 3D Slicer, saved as NAME.nrrd"},
     {"a picture", ".gif .bmp .webp .heic .avif .tga ", "", magick},
     {"a picture in grey or colours", ".pgm .ppm .pnm ", "", magick},
-    {"a drawing in SVG", ".svg ", "", "inkscape FILE -o NAME.png"},
+    {"a drawing in SVG", ".svg ", "", "convert it: inkscape FILE -o NAME.png"},
     {"a document", ".pdf .docx .odt ", "", "give the picture, surface, image or mesh of the body"},
     {"an archive", ".zip .tar .tgz .7z .rar .mrb .gz .bz2 .xz .zst ", "", "unpack it and give what is in it"},
     {"a table", ".csv .tsv .xlsx .ods ", "",
-     "palpate-runtime play MODEL.palpate.hdf --device script:FILE moves a tool along a table of poses"},
+     "a table of poses moves a tool: palpate-runtime play MODEL.palpate.hdf --device script:FILE"},
 });
 
 std::string lower(std::string text) {

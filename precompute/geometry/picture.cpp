@@ -7,6 +7,7 @@
 #include <CGAL/Polyline_simplification_2/simplify.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "precompute/geometry/picture_reader.h"
 #include "precompute/geometry/pixel_body.h"
@@ -27,6 +28,7 @@ using Triangulation = CGAL::Constrained_triangulation_plus_2<CGAL::Constrained_D
 constexpr double corner_run = 3.0;      // pixels; shorter runs are steps of a slanted line
 constexpr double step_tolerance = 0.5;  // pixels
 constexpr double tolerance_per_edge = 0.05;
+constexpr double area_tolerance = 0.02;
 
 /// Straight piece of an outline.
 struct Run {
@@ -81,15 +83,12 @@ std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
   return line;
 }
 
-/// The lines around the body, simplified together so that they do not cross.
-PolygonGeometry outline(const PixelBody& body, double edge_length) {
+/// Closed lines, simplified together so that they do not cross: no point of theirs is further away than this.
+PolygonGeometry simplified(const std::vector<std::vector<Point>>& lines, double tolerance) {
   Triangulation triangulation;
   std::vector<Triangulation::Constraint_id> ids;
-  for (const std::vector<LatticePoint>& line : trace_outlines(body)) {
-    const std::vector<Point> points = without_steps(line);
+  for (const std::vector<Point>& points : lines)
     ids.push_back(triangulation.insert_constraint(points.begin(), points.end(), true));
-  }
-  const double tolerance = std::max(step_tolerance, tolerance_per_edge * edge_length);
   simplification::simplify(triangulation, simplification::Squared_distance_cost(),
                            simplification::Stop_above_cost_threshold(tolerance * tolerance));
   PolygonGeometry polygon;
@@ -101,6 +100,35 @@ PolygonGeometry outline(const PixelBody& body, double edge_length) {
     points.pop_back();  // the first again
   }
   return polygon;
+}
+
+template <typename Points>
+double signed_area(const Points& points) {
+  double twice = 0.0;
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    const auto &a = points[p], &b = points[(p + 1) % points.size()];
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  return twice / 2.0;
+}
+
+/// The lines around the body, as simple as the edges of the mesh allow and the area that they enclose:
+/// strokes thinner than an edge lose their ends, and half of their width, within what an edge does not see.
+PolygonGeometry outline(const PixelBody& body, double edge_length) {
+  std::vector<std::vector<Point>> lines;
+  double area = 0.0;
+  for (const std::vector<LatticePoint>& line : trace_outlines(body)) {
+    lines.push_back(without_steps(line));
+    area += signed_area(lines.back());
+  }
+  for (double tolerance = std::max(step_tolerance, tolerance_per_edge * edge_length);;
+       tolerance = std::max(step_tolerance, tolerance / 2.0)) {
+    PolygonGeometry polygon = simplified(lines, tolerance);
+    double left = signed_area(polygon.points);
+    for (const std::vector<Vec3>& hole : polygon.holes) left += signed_area(hole);
+    if (tolerance == step_tolerance || std::abs(left - area) <= area_tolerance * std::abs(area))
+      return polygon;
+  }
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ export function light_title(light: Light, change: NonNullable<State['change']>, 
 /** The light beside the contacts, and what it means where it is not green; `beside` is what turned_beside has. */
 export function show_light({ change: all, model, settings }: State, beside: number): void {
   const change = all ? { ...all, rotation: Math.min(all.rotation, beside) } : all;
-  const light = light_of(change, model.studied_rotation);
+  const of_body = light_of(change, model.studied_rotation);
+  const light = of_body === 'good' && light_of(all, model.studied_rotation) !== 'good' ? null : of_body; // nothing is known of a steep dent
   const shown = part('range-light');
   shown.hidden = light === null;
   part('range-note').hidden = light === null || light === 'good';

@@ -203,6 +203,18 @@ TEST_F(Picture, ThinBarKeepsItsArea) {
   EXPECT_NEAR(bar(2), 120.0, 1e-9);
 }
 
+TEST_F(Picture, ThinStrokesKeepTheirAreaWhateverTheEdges) {
+  const Bytes file = drawing(400, 300, [](double x, double y) {
+    const auto stroke = [&](double from, double to, double slope) {
+      return x > from && x < to && std::abs(y - 150 - slope * (x - 200)) < 4 * std::hypot(1.0, slope);
+    };
+    return stroke(20, 380, 0.0) || stroke(200, 330, 0.9) || stroke(80, 200, 1.1);
+  });
+  const Mesh strokes = mesh(file, 100.0);
+  expect_plane_mesh(strokes, 0);
+  EXPECT_NEAR(area(strokes), count(file), 0.025 * count(file));
+}
+
 TEST_F(Picture, NotFinerThanNeeded) {
   const Bytes star = drawing(300, 200, [](double x, double y) {
     const double angle = std::atan2(y - 100, x - 150);
