@@ -169,6 +169,8 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
 }
 
 bool holds_ticks(const std::filesystem::path& recording) {
+  std::error_code unknown;
+  if (std::filesystem::file_size(recording, unknown) == 0) return false;
   try {
     const mcap::Layout layout = mcap::read_layout(open_file(recording, OpenMode::read));
     return std::ranges::any_of(layout.chunks, [](const mcap::ChunkPlace& chunk) {

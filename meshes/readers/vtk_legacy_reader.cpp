@@ -217,8 +217,7 @@ bool read_attribute(TextReader& reader, const std::string& keyword, std::int64_t
   } else if (keyword == "SCALARS") {
     const std::string type(reader.word("an array's type"));
     std::int64_t width = 1;
-    if (reader.peek() != "LOOKUP_TABLE" && reader.words_on_line() == 1)
-      width = reader.integer("their number", 1, 4);
+    if (reader.words_on_line() == 1) width = reader.integer("their number", 1, 4);
     if (reader.peek() == "LOOKUP_TABLE") reader.skip_words(2, "the table's name");
     read_values(reader, name, type, width, tuples, arrays);
   } else if (const auto known = components.find(keyword); known != components.end()) {

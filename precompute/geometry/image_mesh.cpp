@@ -176,23 +176,23 @@ const char* const finer_voxels =
 void check_thickness(const VoxelBody& body, const LabelField& field, const std::string& where,
                      std::vector<std::string>& notes) {
   std::vector<std::uint8_t> lost(body.inside.size(), 0);
-  double voxels = 0.0, lost_voxels = 0.0;
+  double voxels = 0.0;
   for (std::size_t v = 0; v < body.inside.size(); ++v) {
     if (body.inside[v] == 0) continue;
     voxels += 1.0;
     lost[v] = field.holds(body.center(v)) ? 0 : 1;
-    lost_voxels += lost[v];
   }
-  if (lost_voxels > most_lost * voxels)
+  const std::size_t lost_voxels = voxels_of_parts(body, lost, told_part);
+  if (static_cast<double>(lost_voxels) > most_lost * voxels)
     throw Error(
-        fmt::format("the image's body is too thin for a mesh: {:.0f} of its {:.0f} voxels are in parts that "
+        fmt::format("the image's body is too thin for a mesh: {} of its {:.0f} voxels are in parts that "
                     "are one voxel thick",
                     lost_voxels, voxels),
         where, finer_voxels);
-  if (const std::size_t part = largest_part(body, lost); part >= told_part)
+  if (lost_voxels > 0)
     notes.push_back(
-        fmt::format("a thin part of the image, {} voxels and one voxel thick, is lost; to keep it, {}", part,
-                    finer_voxels));
+        fmt::format("a thin part of the image, {} voxels and one voxel thick, is lost; to keep it, {}",
+                    lost_voxels, finer_voxels));
 }
 
 /// Tells where the mesh is not the image's body.

@@ -227,12 +227,13 @@ VoxelBody crop(const VoxelBody& body, Index margin) {
   return result;
 }
 
-std::size_t largest_part(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks) {
+std::size_t voxels_of_parts(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks,
+                            std::size_t least) {
   std::vector<Index> part_of;
-  std::size_t largest = 0;
+  std::size_t voxels = 0;
   for (const auto& part : find_parts(grid, marks, part_of))
-    if (part.value != 0) largest = std::max(largest, part.voxels);
-  return largest;
+    if (part.value != 0 && part.voxels >= least) voxels += part.voxels;
+  return voxels;
 }
 
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes) {

@@ -41,8 +41,8 @@ struct VoxelBody : VoxelGrid {
 /// voxel of body.
 VoxelBody crop(const VoxelBody& body, Index margin);
 
-/// Voxels of the largest part (connected through faces) of those that are marked by 1; 0 where none is.
-std::size_t largest_part(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks);
+/// Voxels that are marked by 1, in parts (connected through faces) of at least so many.
+std::size_t voxels_of_parts(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks, std::size_t least);
 
 /// Keeps the largest part (voxels connected through faces): removes parts smaller than 1 % of it and fills
 /// cavities smaller than that, each told in `notes`. Throws Error (where = `where`) when another large part

@@ -501,7 +501,7 @@ class BadDescriptions(ProgramTest):
         result = run(PRECOMPUTE, model, cwd=self.folder)
         self.assertEqual(result.returncode, 0)
         # With the plan and as the last word of the run, on a line of its own each time.
-        warning = "\n\nwarning: the body is 100 m long: if its numbers are millimetres, write scale = 0.001 under [geometry], " \
+        warning = "\n\nwarning: the body is 100 m long: if its numbers are millimetres, write scale = 0.001 under [geometry] (now 1), " \
                   "which makes it 0.1 m\n\n"
         self.assertEqual(result.stderr.count(warning), 2)
         self.assertGreater(result.stderr.rindex(warning), result.stderr.index("palpate.hdf written"))

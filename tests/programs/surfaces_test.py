@@ -174,7 +174,7 @@ scope = "surface"
     def test_missing_and_damaged_files(self):
         self.assert_refused(run(PRECOMPUTE, "none.stl", cwd=self.folder), "none.stl", "No such file")
         self.write("bad.ply", "this is no surface\n")
-        self.assert_refused(run(PRECOMPUTE, "bad.ply", cwd=self.folder), "bad.ply", "cannot read a surface")
+        self.assert_refused(run(PRECOMPUTE, "bad.ply", cwd=self.folder), "bad.ply:1", "where ply should be")
 
 
 class Questions(ProgramTest):

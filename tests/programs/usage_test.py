@@ -262,10 +262,10 @@ class NotADescription(ProgramTest):
     def test_a_file_under_another_key_is_told_its_own(self):
         for key, name, right in (("mesh", "x.vtk", "volume"), ("file", "y.stl", "surface"), ("img", "z.nii.gz", "image")):
             model = self.write("model.toml", f'name = "a"\n[geometry]\n{key} = "{name}"\n')
-            self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), f"no key '{key}'", f'write {right} = "{name}"')
+            self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), f"no key '{key}'", f'{right} = "{name}"')
         self.write("a.off", OFF)
         model = self.write("model.toml", cube_toml(2).replace("box = ", 'volume = "a.off" # '))
-        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "a.off", "a surface in OFF", "write surface =")
+        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "a.off", "a surface in OFF", "rite surface =")
 
     def test_files_of_ours_and_folders(self):
         file = self.bake(cube_toml(2), name="cube.toml")

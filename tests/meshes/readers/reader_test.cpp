@@ -342,7 +342,7 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.msh", &gmsh2, "5 4 2 8 1", "5 6 2 8 1", 22, "type 6"},
       {"a.msh", &gmsh2, "5 4 2 8 1 9 40 3 4", "5 11 2 8 1 9 40 3 4", 23, "where a node number"},
       {"a.msh", &gmsh2, "$EndElements\n", "", 23, "$EndElements"},
-      {"a.msh", &gmsh2, "$EndPhysicalNames", "$EndOther", 24, "$EndPhysicalNames"},
+      {"a.msh", &gmsh2, "$EndPhysicalNames", "$EndOther", 7, "$EndPhysicalNames"},
       {"a.msh", &gmsh2, "4 4 2 7 1 1 9 40 3\n5 4 2 8 1 9 40 3 4", "4 15 2 0 1 1\n5 2 2 0 1 1 9 3", 23,
        "surface of 2 tri3"},
       {"a.msh", &gmsh2, "3 2 2 5 1 1 40 9\n4 4 2 7 1 1 9 40 3\n5 4 2 8 1 9 40 3 4",
