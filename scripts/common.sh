@@ -49,11 +49,14 @@ build() {
   say "building ($preset)"
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
   export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=true CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_IGNOREOPTIONS=-Werror
-  # What was built for use becomes what is tested: a precompiled header that is there would count as an input of its own making, and be new to the cache.
-  if [ -n "${configure_options[*]}" ] && grep -qs '^PALPATE_WERROR:BOOL=OFF' "$root/build/$preset/CMakeCache.txt"; then
+  local before
+  before=$(grep -s '^PALPATE_WERROR:' "$root/build/$preset/CMakeCache.txt" || true)
+  cmake --preset "$preset" "${configure_options[@]}" >/dev/null
+  # What is built for use and what is tested differ by -Werror alone, which the cache leaves out; but a precompiled header that is there counts
+  # as an input of its own making, and would be new to it.
+  if [ "$before" != "$(grep '^PALPATE_WERROR:' "$root/build/$preset/CMakeCache.txt")" ]; then
     find "$root/build/$preset" -name '*.gch' -delete
   fi
-  cmake --preset "$preset" "${configure_options[@]}" >/dev/null
   cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
 }
 
