@@ -24,11 +24,9 @@ breathe_domain_by_file_pattern = {"*/palpate.h": "c"}
 
 html_theme = "furo"
 html_favicon = "site/icon.svg"
-html_static_path = [
-    "site/book.css",
-    "/usr/share/javascript/normalize.css/normalize.css",
-    "/usr/share/fonts/truetype/dejavu/DejaVuMathTeXGyre.ttf",
-]
+html_static_path = ["site/book.css", "/usr/share/fonts/truetype/dejavu/DejaVuMathTeXGyre.ttf"]
+NORMALIZE = "/usr/share/javascript/normalize.css/normalize.css"  # newer Furos bring it themselves
+html_static_path += [NORMALIZE] if pathlib.Path(NORMALIZE).exists() else []
 html_css_files = ["book.css"]
 html_use_index = False  # of the C interface alone, whose page lists it too
 html_copy_source = False

@@ -21,7 +21,7 @@ def without_inline(page, site):
         path = "../" * len(page.relative_to(site).parent.parts) + "_static/" + name
         return f'<script src="{path}"></script>' if kind == "script" else f'<link rel="stylesheet" href="{path}" type="text/css" />'
 
-    return INLINE.sub(as_file, page.read_text()).replace('style="display: none;"', 'class="symbols"')
+    return INLINE.sub(as_file, page.read_text()).replace('style="display: none;"', 'class="symbols"').replace('style="opacity: 50%"', 'opacity="50%"')
 
 
 def mend(app, problem):

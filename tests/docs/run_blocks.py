@@ -135,7 +135,10 @@ def check(block):
 
 
 def same_output(expected, printed):
-    """Whether the lines match, `...` standing for any number of them."""
+    """Whether the lines match, `...` standing for any number of them, and in a line for anything."""
+    def matches(line, printed_line):
+        return re.fullmatch(".*".join(map(re.escape, line.split("..."))), printed_line)
+
     want = [line.rstrip() for line in expected.strip("\n").splitlines()]
     have = [line.rstrip() for line in printed.strip("\n").splitlines()]
     reach = {0}  # how many lines of `have` what was looked at so far can stand for
@@ -143,7 +146,7 @@ def same_output(expected, printed):
         if line.strip() == "...":
             reach = set(range(min(reach), len(have) + 1)) if reach else reach
         else:
-            reach = {k + 1 for k in reach if k < len(have) and have[k] == line}
+            reach = {k + 1 for k in reach if k < len(have) and matches(line, have[k])}
     return len(have) in reach
 
 

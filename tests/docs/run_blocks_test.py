@@ -112,8 +112,12 @@ class Outputs(Pages):
         for expected in ("...\n5", "1\n...\n5", "1\n2\n...", "...", "1\n2\n3\n4\n5", "1\n...\n3\n...\n5", "1\n...\n2\n3\n4\n5"):
             self.passes(f"```sh\nseq 5\n```\n<!-- output -->\n```text\n{expected}\n```\n", "1 outputs compared")
 
+    def test_dots_in_a_line_stand_for_anything(self):
+        for expected in ("8 no...", "... nodes, 1...1 faces", "8 nodes, 12.1 faces..."):
+            self.passes(f"```sh\necho 8 nodes, 12.1 faces\n```\n<!-- output -->\n```text\n{expected}\n```\n", "1 outputs compared")
+
     def test_other_output_is_refused_and_shown(self):
-        for expected in ("1\n2", "...\n4", "2\n...", "1\n...\n6\n...", "5\n...\n1", ""):
+        for expected in ("1\n2", "3...\n...", "...\n4", "2\n...", "1\n...\n6\n...", "5\n...\n1", ""):
             self.fails(f"```sh\nseq 5\n```\n<!-- output -->\n```text\n{expected}\n```\n", "page.md:5: the output differs", "commands of line 1 printed\n    1\n    2\n")
 
     def test_trailing_blanks_do_not_count(self):

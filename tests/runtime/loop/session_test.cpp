@@ -348,6 +348,7 @@ TEST_F(RecorderTest, WithoutFinishIsLeftAsIfItWereKilled) {
 std::vector<std::string> events_of(const std::filesystem::path& path) {
   const FileDescriptor file = open_file(path, OpenMode::read);
   std::vector<std::string> texts;
+  std::vector<char> text;
   for (const mcap::ChunkPlace& chunk : mcap::read_layout(file).chunks) {
     const std::string records = mcap::read_chunk(file, chunk);
     for (const mcap::Message& message : mcap::messages_of(path, records)) {
@@ -357,7 +358,6 @@ std::vector<std::string> events_of(const std::filesystem::path& path) {
       (void)reader.number<std::uint32_t>();
       (void)reader.number<std::uint8_t>();  // level
       for (int k = 0; k < 2; ++k) {         // who says it, and what
-        std::vector<char> text;
         reader.get(text);
         if (k == 1) texts.emplace_back(text.data());
       }
