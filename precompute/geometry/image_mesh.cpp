@@ -245,6 +245,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
     notes.push_back(
         fmt::format("removed {} element(s) that hung on the body by an edge or a corner", crumbs));
   }
+  for (Vec3& node : mesh.nodes) node = body.in_space(node);
   note_volume(mesh, body, notes);
   if (image.regions) {
     report_volumes(mesh, body, notes);

@@ -40,82 +40,48 @@ double degrees(double cosine) {
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
-/// Makes the axes orthogonal. With columns = Q R (Gram and Schmidt, the axis of the longest step last, so
-/// that it is finer ones that are rounded to) a voxel s lies at Q diag(R) t with t_a = s_a + sum of R_ab /
-/// R_aa s_b over b > a: rows are moved by whole voxels, and none is lost. Returns the largest angle by which
-/// two axes missed a right one [degrees], 0 where nothing had to move.
-double straighten(ImagePlace& place, std::array<std::size_t, 3>& size, Labels& labels,
-                  const std::string& where) {
-  Eigen::Matrix3d columns = place.to_space.leftCols<3>();
+/// Axes at right angles in place of those of the image, by Gram and Schmidt: those of longer steps are turned
+/// onto the finer ones. Volumes stay as they are.
+Eigen::Matrix3d straightened(const Eigen::Matrix3d& columns) {
   std::array<int, 3> order = {0, 1, 2};
   std::ranges::stable_sort(order, {}, [&](int axis) { return columns.col(axis).norm(); });
-  Eigen::Matrix3d shift = Eigen::Matrix3d::Zero();  // [voxel] of an axis, per voxel of another
-  std::array<double, 3> low{}, high{};              // [voxel] what an axis is moved by
-  double angle = 0.0, most = 0.0;
+  Eigen::Matrix3d straight = columns;
   for (std::size_t b = 0; b < 3; ++b) {
-    const int axis = order.at(b);
     for (std::size_t a = 0; a < b; ++a) {
-      const int before = order.at(a);
-      const Eigen::Vector3d along = columns.col(before);
-      const double moved = along.dot(place.to_space.col(axis)) / along.squaredNorm();
-      angle = std::max(angle, std::abs(90.0 - degrees(along.dot(place.to_space.col(axis)) / along.norm() /
-                                                      place.to_space.col(axis).norm())));
-      columns.col(axis) -= moved * along;
-      shift(before, axis) = moved;
-      const double last = moved * static_cast<double>(size.at(static_cast<std::size_t>(axis)) - 1);
-      low.at(static_cast<std::size_t>(before)) += std::min(last, 0.0);
-      high.at(static_cast<std::size_t>(before)) += std::max(last, 0.0);
-      most = std::max(most, std::abs(last));
+      const Eigen::Vector3d along = straight.col(order.at(a));
+      straight.col(order.at(b)) -= along.dot(straight.col(order.at(b))) / along.squaredNorm() * along;
     }
   }
-  if (!(most >= 0.5) || !columns.allFinite()) return 0.0;  // no voxel moves, or the matrix is singular
-  std::array<std::size_t, 3> wider{};
-  double voxels = 1.0;
-  std::string product;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    low.at(axis) = std::floor(low.at(axis));
-    const double width = static_cast<double>(size.at(axis)) + std::ceil(high.at(axis)) - low.at(axis);
-    product += fmt::format("{}{}", product.empty() ? "a sheared box of " : " x ", width);
-    voxels *= width;
-    if (voxels <= static_cast<double>(most_voxels)) wider.at(axis) = static_cast<std::size_t>(width);
-    place.to_space.col(3) += low.at(axis) * columns.col(static_cast<int>(axis));
+  return straight;
+}
+
+/// Largest angle by which two of the axes miss a right one [degrees].
+double skew(const Eigen::Matrix3d& columns) {
+  double most = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3d one = columns.col(a).normalized(), next = columns.col((a + 1) % 3).normalized();
+    most = std::max(most, std::abs(90.0 - degrees(one.dot(next))));
   }
-  check_voxels(product, voxels, 4.0, where);
-  std::vector<std::int32_t> moved(wider[0] * wider[1] * wider[2], 0);
-  std::size_t v = 0;
-  for (std::size_t k = 0; k < size[2]; ++k) {
-    for (std::size_t j = 0; j < size[1]; ++j) {
-      for (std::size_t i = 0; i < size[0]; ++i, ++v) {
-        const Eigen::Vector3d s(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
-        std::array<std::size_t, 3> t{};
-        for (int axis = 0; axis < 3; ++axis)
-          t.at(static_cast<std::size_t>(axis)) = static_cast<std::size_t>(
-              s[axis] + std::round(shift.row(axis).dot(s)) - low.at(static_cast<std::size_t>(axis)));
-        moved[t[0] + wider[0] * (t[1] + wider[1] * t[2])] = labels.of_voxels[v];
-      }
-    }
-  }
-  place.to_space.leftCols<3>() = columns;
-  size = wider;
-  labels.of_voxels = std::move(moved);
-  return angle;
+  return most;
 }
 
 }  // namespace
 
-ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels,
-                        const std::string& where) {
-  const double sheared = straighten(place, size, labels, where);
+ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels) {
+  constexpr double least_skew = 0.1;  // degrees
+  const Eigen::Matrix3d given = place.to_space.leftCols<3>();
+  Eigen::Matrix3d directions = given;
+  const bool is_sheared = skew(given) > least_skew && std::abs(given.determinant()) > 0.0;
+  if (is_sheared) place.to_space.leftCols<3>() = directions = straightened(given);
   const Axes axes = axes_of(place.to_space);
   const double unit = place.unit > 0.0 ? place.unit : 1.0;
-  const Eigen::Matrix3d directions = place.to_space.leftCols<3>();
   Eigen::Vector3d corner = place.to_space.col(3);
   const std::array<std::size_t, 3> stride = {1, size[0], size[0] * size[1]};
   ImageHeader header;
   header.unit = place.unit;
-  header.sheared = sheared;
   std::array<std::ptrdiff_t, 3> step{};
   std::ptrdiff_t first = 0;
+  Eigen::Matrix3d turn;  // from the axes of the body to space
   for (std::size_t along = 0; along < 3; ++along) {
     const std::size_t from = axes.from.at(along);
     const auto column = directions.col(static_cast<Eigen::Index>(from));
@@ -126,10 +92,16 @@ ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Label
     const double cosine = std::abs(column[static_cast<Eigen::Index>(along)]) / column.norm();
     header.turned = std::max(header.turned, degrees(cosine));
     const bool backwards = axes.backwards.at(along);
+    turn.col(static_cast<Eigen::Index>(along)) = column.normalized() * (backwards ? -1.0 : 1.0);
     step.at(along) = backwards ? -pace : pace;
     if (!backwards) continue;
     first += (count - 1) * pace;
-    corner += static_cast<double>(count - 1) * column;
+    corner += static_cast<double>(count - 1) * given.col(static_cast<Eigen::Index>(from));
+  }
+  if (is_sheared) {
+    header.turned = 0.0;  // it is where it is
+    header.sheared = skew(given);
+    Eigen::Matrix3d::Map(header.shear.data()) = given * directions.inverse() * turn;
   }
   for (std::size_t axis = 0; axis < 3; ++axis)
     header.origin.at(axis) = unit * corner[static_cast<Eigen::Index>(axis)];

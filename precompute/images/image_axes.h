@@ -21,10 +21,8 @@ struct ImagePlace {
 };
 
 /// The image along the axes of space: its own are exchanged and turned round so that they come as near to
-/// those as they can; in mm. Where they are not at right angles, as with a tilted gantry, rows and slices of
-/// voxels move along the others to where they are in space. `labels` has `size` voxels, the first axis
-/// running fastest. Throws Error where that takes too many voxels.
-ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels,
-                        const std::string& where);
+/// those as they can; in mm. Where they are not at right angles, as with a tilted gantry, the grid has right
+/// ones and its header how the body is sheared. `labels` has `size` voxels, the first axis running fastest.
+ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels);
 
 }  // namespace palpate

@@ -117,11 +117,11 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
         "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
   if (header.sheared > 0.0)
     notes.push_back(
-        fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry: its voxels were moved "
-                    "to where they "
-                    "are in space",
+        fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry, and so is the body",
                     header.sheared));
   body.file_unit = header.unit;
+  body.shear = Mat3::Map(header.shear.data());
+  body.sheared_about = body.origin;
 
   std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
   body.inside.reserve(labels.size());
@@ -193,7 +193,6 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
   if (read.status != read_ok) throw not_readable();
   const VoxelBody whole = select(read.bytes, image, notes);
   VoxelBody body = crop(whole, 2);
-  body.file_unit = whole.file_unit;
   if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
     throw Error(
         fmt::format("edge_length is {} of the image's units, its voxels are {} x {} x {}", shown(edge_length),

@@ -233,7 +233,7 @@ ChildResult read_nifti_labels(const FileDescriptor& file, const std::optional<Va
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column) place.to_space(row, column) = to_space.m[row][column];
   place.unit = millimetres(image->xyz_units);
-  return along_space(place, size, std::move(labels), file.path().string());
+  return along_space(place, size, std::move(labels));
 }
 
 }  // namespace palpate

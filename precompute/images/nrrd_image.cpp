@@ -229,8 +229,7 @@ ChildResult read_nrrd_labels(const FileDescriptor& file, const std::optional<Val
   const std::string where = file.path().string();
   return along_space(place_of(*image, axes, where), size,
                      labels_from(size[0] * size[1] * size[2], range,
-                                 [&](std::size_t v) { return value_at(image->data, v); }),
-                     where);
+                                 [&](std::size_t v) { return value_at(image->data, v); }));
 }
 
 }  // namespace palpate

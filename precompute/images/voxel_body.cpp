@@ -205,6 +205,9 @@ VoxelBody crop(const VoxelBody& body, Index margin) {
   }
   VoxelBody result;
   result.spacing = body.spacing;
+  result.file_unit = body.file_unit;
+  result.shear = body.shear;
+  result.sheared_about = body.sheared_about;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
     result.size[axis] = high[axis] - low[axis] + 1 + 2 * margin;
