@@ -4,10 +4,12 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include "meshes/node_vectors.h"
 #include "runtime/live/live_model.h"
+#include "statics/polar.h"
 
 namespace palpate {
 
@@ -37,7 +39,10 @@ LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
       predicted_(state_),
       push_(Eigen::VectorXd::Zero(live_.dofs())),
       by_load_(static_cast<std::size_t>(body.greens().order())),
-      by_last_load_(by_load_.size()) {
+      by_last_load_(by_load_.size()),
+      found_(state_.x),
+      untouched_(state_.x),
+      far_(static_cast<std::size_t>(live_.dofs() / live_.dimension())) {
   predict();
 }
 
@@ -53,6 +58,7 @@ void LiveMotion::rest() noexcept {
   compliance_.rest();
   std::fill(by_last_load_.begin(), by_last_load_.end(), 0.0);
   predict();
+  found_ = untouched_ = state_.x;
   const std::lock_guard lock(mutex_);
   telling_ = {};
 }
@@ -85,12 +91,58 @@ void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcep
   const double error = compare(job, report);
   push_ = push;
   predict();
+  follow_untouched();
   if (compliance_.follow(state_, error)) displace(job.load, by_load_);
   std::swap(by_load_, by_last_load_);
   for (Index stored = 0; stored < body_.greens().nodes(); ++stored) {
     const Vec3 moved = node_part(predicted_.x, d, body_.mesh_node(stored)) - body_.rest_position(stored);
     set_vector(u, d, stored, moved - vector_at(by_last_load_, d, stored));
   }
+}
+
+/// Where the nodes would be without the tool: as it found them, held ones in their place. A body that nothing
+/// holds has moved since, by the rigid motion that is nearest (Horn 1987) to that of the half of its nodes
+/// which is far from the tool.
+void LiveMotion::follow_untouched() noexcept {
+  if (push_.isZero(0.0)) {
+    found_ = state_.x;
+    untouched_ = predicted_.x;
+    return;
+  }
+  untouched_ = found_;
+  if (live_.free_dofs() < live_.dofs()) return;
+  const int d = live_.dimension();
+  Vec3 pressed = Vec3::Zero();
+  double sum = 0.0;
+  for (Index node = 0; node < std::ssize(far_); ++node) {
+    const double force = node_part(push_, d, node).norm();
+    pressed += force * node_part(found_, d, node);
+    sum += force;
+  }
+  pressed /= sum;
+  const auto away = [&](Index node) { return (node_part(found_, d, node) - pressed).squaredNorm(); };
+  std::iota(far_.begin(), far_.end(), 0);
+  const auto half = far_.begin() + std::ssize(far_) / 2;
+  std::nth_element(far_.begin(), half, far_.end(), [&](Index a, Index b) { return away(a) < away(b); });
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();
+  const std::span<const Index> far(half, far_.end());
+  for (const Index node : far) {
+    from += node_part(found_, d, node) / static_cast<double>(far.size());
+    to += node_part(predicted_.x, d, node) / static_cast<double>(far.size());
+  }
+  Mat3 turn = Mat3::Zero();
+  for (const Index node : far)
+    turn += (node_part(predicted_.x, d, node) - to) * (node_part(found_, d, node) - from).transpose();
+  const Mat3 R = d == 2 ? nearest_rotation_in_plane(turn) : nearest_rotation(turn);
+  for (Index node = 0; node < std::ssize(far_); ++node)
+    untouched_.segment(Eigen::Index{d} * node, d) = (to + R * (node_part(found_, d, node) - from)).head(d);
+}
+
+void LiveMotion::tell_untouched(std::vector<double>& u) const noexcept {
+  const int d = live_.dimension();
+  u.resize(static_cast<std::size_t>(body_.greens().order()));
+  for (Index stored = 0; stored < body_.greens().nodes(); ++stored)
+    set_vector(u, d, stored, node_part(untouched_, d, body_.mesh_node(stored)) - body_.rest_position(stored));
 }
 
 /// u [n] = W f.

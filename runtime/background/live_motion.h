@@ -50,6 +50,7 @@ class LiveMotion final : public MotionStepper {
     return compliance_.renewed();
   }
   [[nodiscard]] bool is_near_limit() const noexcept override { return predicted_report_.is_near; }
+  void tell_untouched(std::vector<double>& u) const noexcept override;
   [[nodiscard]] const LiveState& state() const noexcept { return state_; }
 
   [[nodiscard]] LiveTelling telling() const;  ///< from any thread
@@ -59,6 +60,7 @@ class LiveMotion final : public MotionStepper {
   void predict() noexcept;
   void displace(const NodalLoad& load, std::vector<double>& u) const noexcept;
   double compare(const MotionJob& job, const LiveReport& report) noexcept;
+  void follow_untouched() noexcept;
 
   const Body& body_;
   const LiveBody& live_;
@@ -69,7 +71,10 @@ class LiveMotion final : public MotionStepper {
   Eigen::VectorXd push_;              // [d N] forces with which it was predicted
   std::vector<double> by_load_;       // [n] W f of the last job
   std::vector<double> by_last_load_;  // [n] W f_p
-  mutable std::mutex mutex_;          // of `telling_`
+  Eigen::VectorXd found_;             // [d N] where all nodes were when the tool was last away,
+  Eigen::VectorXd untouched_;  // [d N] and that moved along with the body, at the end of the predicted step
+  std::vector<Index> far_;     // [N] scratch: nodes in the order of their way from the tool
+  mutable std::mutex mutex_;   // of `telling_`
   LiveTelling telling_;
 };
 

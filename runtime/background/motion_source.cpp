@@ -121,6 +121,7 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
   sample.compliance = stepper_->compliance();
   sample.is_near_limit = stepper_->is_near_limit();
+  stepper_->tell_untouched(sample.untouched);
   let_go_done_ = job.let_go;
   samples_.publish();
   ++steps_;

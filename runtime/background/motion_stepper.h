@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "runtime/body/free_motion.h"
 
@@ -23,6 +24,8 @@ class MotionStepper {
   virtual void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept = 0;
   /// Whether the last step was explicit, and close to the longest stable one.
   [[nodiscard]] virtual bool is_near_limit() const noexcept { return false; }
+  /// Fills `u` as MotionSample::untouched.
+  virtual void tell_untouched(std::vector<double>& u) const noexcept { u.clear(); }
   /// What contact forces act by on top of that u; null: the body's Green's functions.
   [[nodiscard]] virtual std::shared_ptr<const Greens> compliance() const noexcept { return nullptr; }
 };

@@ -115,6 +115,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
   pending_held_.resize(held_.size());
   u_before_.resize(size_if(packed, n));
   u_.resize(u_before_.size());
+  untouched_.resize(size_if(body.live() != nullptr, n));
   if (const Modes* modes = body.modes()) {
     modal_.emplace(modes->omega(), dynamics.damping, dynamics.newmark);
     for (std::vector<double>* of_modes : {&q_before_, &q_held_, &shown_, &g_, &rate_})
@@ -184,6 +185,15 @@ Vec3 FreeMotion::displacement(const Body& body, Index stored) const noexcept {
                          share_ * vector_at(u_, dimension_, stored));
   if (fade_ > 0.0) u += fade_ * vector_at(held_, dimension_, stored);
   if (!pending_.force.empty()) u += vector_at(pending_held_, dimension_, stored);
+  return u;
+}
+
+Vec3 FreeMotion::untouched(const Body& body, Index surface_node) const noexcept {
+  Vec3 u = Vec3::Zero();
+  if (untouched_.empty()) return u;
+  const SurfaceParts parts = body.surface_parts(surface_node);
+  for (std::size_t k = 0; k < parts.stored.size(); ++k)
+    u += parts.weights[k] * vector_at(untouched_, dimension_, parts.stored[k]);
   return u;
 }
 
@@ -315,6 +325,7 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
     if (has_held) u_before_[i] += held_[i];
   }
   std::copy(sample.u.begin(), sample.u.end(), u_.begin());
+  std::copy(sample.untouched.begin(), sample.untouched.end(), untouched_.begin());
   if (has_held) {
     fade_ = 0.0;
     held_in_flight_ = false;

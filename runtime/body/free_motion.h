@@ -44,6 +44,8 @@ struct MotionSample {
   /// What contact forces act by from then on, for a live or warped body; null: the body's Green's functions.
   std::shared_ptr<const Greens> compliance{};
   bool is_near_limit = false;  ///< a live body's explicit step is close to the longest stable one
+  /// [n] Of a live body: as the tool found it, moved along with it [m]; else empty.
+  std::vector<double> untouched{};
 };
 
 /// A moment of free motion, for the eye: the modes times q plus u.
@@ -85,6 +87,9 @@ class FreeMotion {
   [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return change_[surface_node]; }
   /// Displacement of a stored node in this tick [m].
   [[nodiscard]] Vec3 displacement(const Body& body, Index stored) const noexcept;
+  /// Displacement of a surface node of a live body, were it not pressed in [m]: as the tool found the body,
+  /// moved along with it. Of other bodies zero.
+  [[nodiscard]] Vec3 untouched(const Body& body, Index surface_node) const noexcept;
   /// All of it in this tick.
   void snapshot(MotionSnapshot& shown) const noexcept;
 
@@ -154,6 +159,7 @@ class FreeMotion {
   std::int64_t sample_phase_ = 0;     // phase in which the sample came
   std::vector<double> u_before_, u_;  // [n] samples between which the tick is
   double share_ = 1.0;                // of u_
+  std::vector<double> untouched_;     // [n] of a live body
 
   // By surface node.
   std::vector<std::int64_t> stamp_;  // tick of the value

@@ -96,6 +96,44 @@ TEST(LiveLoad, AllColumnsByThreadsAreThoseInTurn) {
 class LiveComplianceOf : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Dimension, LiveComplianceOf, testing::Values(2, 3));
 
+// It falls by 20 mm, and is pressed by 1 and by 3 mm where it lies.
+TEST_P(LiveComplianceOf, ABodyThatFellIsPressedInFromWhereItLies) {
+  const int d = GetParam();
+  const Vec3 up = Vec3::Unit(d - 1);
+  const Body body = test::live_bar(
+      d, {.solver = LiveLaw::corotational, .gravity = -9.81 * up, .free = true, .floor = -0.02});
+  State state(body, {.tools = {Tool{.radius = 0.005}}});
+  MotionSource source(body, state, {.in_background = false});
+  const Vec3 middle(0.04, d == 3 ? 0.01 : 0.02, 0.02);
+  const auto away = [&](const Vec3& x) { return (x - middle).head(d).norm(); };
+  const auto node = static_cast<Index>(std::ranges::min_element(body.surface_rest_positions(), {}, away) -
+                                       body.surface_rest_positions().begin());
+  const auto hold = [&](double height, int ticks) {
+    Vec3 at = middle;
+    at[d - 1] = height;
+    if (d == 2) at.z() = 0.0;
+    for (int tick = 0; tick < ticks; ++tick) {
+      source.receive(state);
+      step(body, state, ToolPose{.position = at});
+      source.post(state);
+    }
+  };
+  const auto height = [&] { return state.surface.tree.position(node)[d - 1]; };
+  hold(0.1, 2000);
+  const double top = height();
+  EXPECT_NEAR(top, 0.0, 0.002) << "it has landed, and sags a little";
+  for (const double by : {0.001, 0.003}) {
+    for (double down = 0.0; down < by; down += 2e-5) hold(top + 0.005 - down, 1);
+    hold(top + 0.005 - by, 500);
+    const Vec3 untouched = body.surface_rest_positions()[static_cast<std::size_t>(node)] +
+                           state.surface.motion.untouched(body, node);
+    EXPECT_GT(state.tools[0].contacts, 0);
+    EXPECT_NEAR(untouched[d - 1] - height(), by, 0.1 * by);
+    hold(0.1, 1500);
+    EXPECT_NEAR(height(), top, 1e-4) << "let go";
+  }
+}
+
 TEST_P(LiveComplianceOf, ABodyThatTurnedIsRightAgain) {
   const Body body = test::live_bar(GetParam(), {.solver = LiveLaw::corotational, .free = true});
   LiveState state(body.live()->body);
