@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/program.h"
+#include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
@@ -30,6 +31,23 @@ std::string too_large(const Tool& tool, double size) {
   const double length = tool.disc_radius > 0.0 ? 2.0 * tool.disc_radius : 2.0 * tool.radius + tool.length;
   if (!(length > size)) return "";
   return fmt::format("the tool is {:.4g} m long, and the whole body {:.4g} m", length, size);
+}
+
+std::string too_small(const Tool& tool, const Body& body) {
+  const double edge = body.mean_surface_edge();
+  if (!(tool.radius > 0.0))
+    return fmt::format("the tool is a point: what it feels is a mesh with edges of {:.2g} m", edge);
+  const double slight = 0.1 * tool.radius;
+  const double stiffening = mesh_stiffening(body, tool, tool.radius);
+  if (!(stiffening > noticed_stiffening)) return "";
+  return fmt::format(
+      "the tool is small for the mesh, whose edges are {:.2g} m: pressed in by {:.2g} m the body is about "
+      "{:.1f} times too stiff, by {:.2g} m {:.1f} times",
+      edge, slight, mesh_stiffening(body, tool, slight), tool.radius, stiffening);
+}
+
+void tell_small_tool(const std::string& note) {
+  if (!note.empty()) say(stderr, "{}; a larger tool, --overlay, a finer mesh or tet10 are truer\n", note);
 }
 
 void settle_tool(PlayOptions& options, const Body& body) {

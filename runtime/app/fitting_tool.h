@@ -17,6 +17,11 @@ namespace palpate {
 /// is longer than the body's `size`, the diagonal of its bounds [m].
 [[nodiscard]] std::string too_large(const Tool& tool, double size);
 
+/// That a tool is small for the body's mesh, for a person; empty where it is not (mesh_stiffening.h, a press
+/// as deep as the tool's radius). A point is.
+[[nodiscard]] std::string too_small(const Tool& tool, const Body& body);
+void tell_small_tool(const std::string& note);  ///< with what helps, unless there is nothing to tell
+
 /// Where a person moves the tool (by a pointer or a device) and the settings name none: the ball that suits
 /// the body, told on the error stream. Scripts and replays without one have a point, so that what they do
 /// depends on no mesh. Warns of a tool that is too large.

@@ -108,6 +108,7 @@ int play(PlayOptions options) {
   }
 
   settle_tool(options, *body);
+  tell_small_tool(too_small(options.settings.tool, *body));
   options.settings = apply_defaults(options.settings, input, *body);
   print_device(input, options.settings);
   SessionViewer viewer;

@@ -17,6 +17,7 @@
 #include "runtime/background/live_motion.h"
 #include "runtime/background/warped_motion.h"
 #include "runtime/live/live_model.h"
+#include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/output.h"
 #include "runtime/warp/studied_range.h"
 #include "statics/surface_change.h"
@@ -86,6 +87,11 @@ void print_loop(const LoopReport& report, bool fast) {
   }
   say(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
       report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
+  if (report.largest_force_stiffening > noticed_stiffening)
+    say(stderr,
+        "it pressed the surface in by {:.2g} m then, where the mesh is about {:.1f} times too stiff for so "
+        "small a tool\n",
+        report.largest_force_depth, report.largest_force_stiffening);
   if (report.largest_greens_error > 0.0) {
     say(stderr, "compressed Green's functions: forces are off by at most {:.2g} N, at {:.3f} s\n",
         report.largest_greens_error, report.largest_greens_error_time);
@@ -463,6 +469,8 @@ std::string json_report(const PlayedRun& run) {
   json["compute_ns"] = json_times(report.compute);
   json["largest_force_N"] = report.largest_force;
   json["largest_force_time_s"] = report.largest_force_time;
+  json["largest_force_depth_m"] = report.largest_force_depth;
+  json["largest_force_mesh_stiffening"] = report.largest_force_stiffening;
   json["largest_jump_N"] = report.largest_jump;
   json["largest_jump_time_s"] = report.largest_jump_time;
   if (report.largest_greens_error > 0.0) {

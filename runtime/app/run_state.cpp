@@ -66,6 +66,7 @@ nlohmann::json to_json(const RunState& state) {
           {"model", state.model},
           {"defaults", state.defaults},
           {"settings", state.settings},
+          {"tool_note", state.tool_note},
           {"device", state.device},
           {"pointer", state.pointer},
           {"hand", state.hand},

@@ -138,6 +138,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   print_device(input_, options.settings);
   if (options.settings.overlay) begin_making("the overlay is being made");
   const SettingsText settled = options.settings_text;
+  const Tool settled_tool = options.settings.tool;
   {
     const std::lock_guard lock(mutex_);
     state_.recording_failed.reset();
@@ -155,6 +156,10 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
   session->latch(latched_);
   const std::lock_guard lock(mutex_);
+  if (const std::string small = too_small(settled_tool, *body_); small != state_.tool_note) {
+    tell_small_tool(small);
+    state_.tool_note = small;
+  }
   state_.settings = settled;
   state_.busy.reset();
   state_.ticks = 0;

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <utility>
 
+#include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/tick_record.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/touch/contact_nodes.h"
@@ -214,7 +215,13 @@ class Loop {
     report_.compute.add(compute_ns_);
     if (!options_.fast) report_.lateness.add(tick_.begun - tick_.due);
     const Vec3& force = tool().wrench.force;
-    note_largest(force.stableNorm(), time(), report_.largest_force, report_.largest_force_time);
+    if (force.stableNorm() > report_.largest_force) {
+      report_.largest_force = force.stableNorm();
+      report_.largest_force_time = time();
+      report_.largest_force_depth = depth();
+      report_.largest_force_stiffening =
+          mesh_stiffening(parts_.body, tool().tool, report_.largest_force_depth);
+    }
     note_largest((force - force_before).stableNorm(), time(), report_.largest_jump,
                  report_.largest_jump_time);
     note_largest(tool().greens_error, time(), report_.largest_greens_error,
@@ -257,15 +264,16 @@ class Loop {
     }
   }
 
-  /// How far the closed contacts press the surface in, at most [m].
+  /// How far the closed contacts press the surface in from where it would be without the tool, at most [m].
   [[nodiscard]] double depth() const noexcept {
     double deepest = 0.0;
     for (const ContactPoint& contact : parts_.state.contacts()) {
       if (contact.force.squaredNorm() == 0.0) continue;
       Vec3 moved = Vec3::Zero();  // inward
       for_each_node(parts_.body, parts_.state.surface.near, contact, [&](Index node, double weight) {
-        const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
-        moved += weight * (rest - parts_.state.surface.tree.position(node));
+        const Vec3 untouched = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)] +
+                               parts_.state.surface.motion.untouched(parts_.body, node);
+        moved += weight * (untouched - parts_.state.surface.tree.position(node));
       });
       deepest =
           std::max(deepest, moved.dot(contact.held ? outward_normal(parts_.state.surface.tree,

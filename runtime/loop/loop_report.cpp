@@ -19,6 +19,10 @@ void LoopReport::add(const LoopReport& later) {
     value = later_value;
     time = begun + later_time;
   };
+  if (later.largest_force > largest_force) {
+    largest_force_depth = later.largest_force_depth;
+    largest_force_stiffening = later.largest_force_stiffening;
+  }
   take_larger(largest_force, largest_force_time, later.largest_force, later.largest_force_time);
   take_larger(largest_jump, largest_jump_time, later.largest_jump, later.largest_jump_time);
   take_larger(largest_greens_error, largest_greens_error_time, later.largest_greens_error,

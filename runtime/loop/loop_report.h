@@ -26,6 +26,8 @@ struct LoopReport {
   TimeHistogram compute;                   ///< of the choice of the overlay and `step` [ns]
   double largest_force = 0.0;              ///< computed, on the body's side [N]
   double largest_force_time = 0.0;         ///< [s]
+  double largest_force_depth = 0.0;        ///< that the surface was pressed in by then [m]
+  double largest_force_stiffening = 1.0;   ///< mesh_stiffening.h, then
   double largest_jump = 0.0;               ///< of it between two ticks [N]
   double largest_jump_time = 0.0;          ///< of the second one [s]
   double largest_greens_error = 0.0;       ///< of ToolState::greens_error [N]

@@ -8,9 +8,16 @@ import numpy as np
 
 from programs import SOURCE, ProgramTest
 
-LOADER = importlib.machinery.SourceFileLoader("hertz", str(SOURCE / "scripts" / "studies" / "hertz"))
-study = importlib.util.module_from_spec(importlib.util.spec_from_loader("hertz", LOADER))
-LOADER.exec_module(study)
+
+def load(name):
+    """scripts/studies/NAME as a module."""
+    loader = importlib.machinery.SourceFileLoader(name, str(SOURCE / "scripts" / "studies" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
+
+
+study = load("hertz")
 
 
 class References(unittest.TestCase):
@@ -51,3 +58,17 @@ class Hertz(ProgramTest):
     def test_a_shallow_press_is_not_held_out_by_edges(self):
         # Edges of L are chords of the sphere: touched, they add 1.5 L^2 / (8 R depth), 4.7 % here with L the diagonal of a cell.
         self.assertAlmostEqual(self.error(20, 0.02), -0.4, delta=0.3)
+
+
+class SmallTools(ProgramTest):
+    """Balls that touch one node and a few, on a block of half the study's size."""
+
+    def test_what_is_told_is_the_ratio_to_hertz(self):
+        small = load("small-tools")
+        small.SIDE, small.CELLS = small.SIDE / 2, {element: cells // 2 for element, cells in small.CELLS.items()}
+        for element in small.CELLS:
+            file = small.bake(self.folder, element, 0.45)
+            for radius, depth in ((0.003, 0.0015), (0.012, 0.0012)):
+                ratio, told = small.press(self.folder, file, radius, depth)
+                self.assertAlmostEqual(told / ratio.mean(), 1, delta=0.15, msg=f"{element}, R {radius}: {ratio}")
+                self.assertGreater(told, 1.5)

@@ -127,6 +127,8 @@ export class RunControls {
     show_value(input('radius'), millimetres(shape.disc_radius || shape.radius || defaults.radius));
     show_value(input('edge'), kind === 'disc' ? millimetres(shape.radius) : '');
     show_value(input('length'), millimetres(shape.length || Number((4 * defaults.radius).toPrecision(3))));
+    write(part('tool-note'), state.tool_note);
+    part('tool-note').hidden = !state.tool_note;
     show_value(input('friction'), settings.friction ?? '');
     input('friction').placeholder = format_number(defaults.friction, 2);
     show_value(select('contact'), settings.contact ?? 'quasi-static');

@@ -55,6 +55,7 @@ export interface State {
   misses: number;
   change?: { rotation: number; strain: number } | null; // the largest of the surface [rad], [-]; null: not known
   settings: Record<string, string>;
+  tool_note: string; // may be empty
   defaults: { radius: number; reach: number; friction: number; depth: number };
   session?: string; // name of a recording's file
   frames?: number;
