@@ -48,6 +48,11 @@ class BuildFlags(unittest.TestCase):
         self.assertIn("Without tests, as these are missing: GTest. scripts/test installs them.", self.configured.stdout)
         self.assertNotIn("step_test.cpp", (self.folder / "build" / "compile_commands.json").read_text())
 
+    def test_what_the_demo_goes_without_is_built_once_it_is_there(self):
+        for missing in ("ON", "OFF"):
+            self.flags_of_c_interface("--preset", "release", "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF", f"-DCMAKE_DISABLE_FIND_PACKAGE_MPI={missing}")
+            self.assertEqual("rank_commands.cpp" in (self.folder / "build" / "compile_commands.json").read_text(), missing == "OFF")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -10,6 +10,19 @@ DEBIAN = SOURCE / "debian"
 
 
 class Debian(unittest.TestCase):
+    def test_builds_with_what_the_scripts_install(self):
+        control = re.search(r"^Build-Depends:(.*?)^\S", (DEBIAN / "control").read_text(), re.M | re.S)[1]
+        asked = set(re.findall(r"[a-z][\w+.-]+", re.sub(r"\(.*?\)", "", control))) - {"debhelper-compat", "dh-python", "python3"}
+        parts = dict(re.findall(r"^\[(\w+)\]\n([^\[]*)", (SOURCE / "scripts/packages.txt").read_text(), re.M))
+        installed = {name for part in ("build", "cluster") for name in parts[part].split()} - {"ccache", "g++", "git"}
+        self.assertEqual(asked, installed | {"libcgal-demo"})
+
+    def test_the_demo_installs_neither_plots_nor_ranks(self):
+        demo = re.search("^install_packages (.*)$", (SOURCE / "scripts/demo").read_text(), re.M)[1]
+        self.assertEqual(demo.split(), ["build", "demo"])
+        everything = re.search("install_packages (.* tests .*)$", (SOURCE / "scripts/test").read_text(), re.M)[1]
+        self.assertLessEqual({"build", "demo", "cluster", "plots"}, set(everything.split()))
+
     def test_udev_knows_the_vendors_of_the_built_in_profiles(self):
         rules = (DEBIAN / "palpate-runtime.udev").read_text()
         known = 0
