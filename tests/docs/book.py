@@ -1,6 +1,7 @@
 """The book's rules, each as a function that yields a line for what breaks it."""
 
 import html.parser
+import itertools
 import os
 import pathlib
 import re
@@ -54,6 +55,31 @@ def broken_links(root):
                 yield f"{page.relative_to(root)}: {link} is not there"
             elif anchor and target.suffix == ".md" and anchor not in anchors(target):
                 yield f"{page.relative_to(root)}: {link}: no such heading"
+
+
+# Where a page lists what the programs take: page, first cell of the row (or of a table's header: its first column), and which of the programs' lists it is.
+FEATURES = (
+    ("docs/comparison.md", "elements", "elements"), ("docs/comparison.md", "live bodies by", "--solver"), ("docs/comparison.md", "their integrators", "--integrator"),
+    ("docs/comparison.md", "finer mesh under the tool", "--overlay-law"), ("docs/comparison.md", "contact", "--contact"), ("docs/comparison.md", "tools", "--tool"),
+    ("docs/comparison.md", "moved by", "--device"), ("docs/comparison.md", "a body from", "files"), ("docs/comparison.md", "recordings become", "exports"),
+    ("docs/elements.md", "element", "elements"), ("docs/live.md", "`--solver`", "--solver"), ("docs/live.md", "`--integrator`", "--integrator"),
+    ("docs/recordings.md", "option", "exports"))
+
+
+def stale_features(root, has):
+    """What such a list lacks of `has`, {list: names}, or has beyond it."""
+    for page, first, name in FEATURES:
+        lines = (root / page).read_text().splitlines()
+        at = next((k for k, line in enumerate(lines) if line.startswith(f"| {first} |")), None)
+        if at is None:
+            yield f"{page}: no row or table begins with {first}"
+            continue
+        cells = [lines[at].split("|")[2]]
+        if at + 1 < len(lines) and lines[at + 1].startswith("|---"):
+            cells = [line.split("|")[1] for line in itertools.takewhile(lambda line: line.startswith("|"), lines[at + 2:])]
+        told = {word.split()[0] for cell in cells for word in re.findall("`([^`]+)`", cell)}
+        for word in sorted(told ^ set(has[name])):
+            yield f"{page}: {first}: {word} is {'not told' if word in has[name] else 'in no program'}"
 
 
 def long_pages(root):

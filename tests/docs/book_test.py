@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -50,6 +51,40 @@ class Site(unittest.TestCase):
         theory = (self.folder / "html" / "theory.html").read_text()
         self.assertIn("<math", theory)
         self.assertNotRegex(theory, "(?i)<script[^>]*(katex|mathjax)")
+
+
+def printed(program, *command):
+    return subprocess.run([BINARY / program, "help", *command], text=True, capture_output=True, check=True).stdout
+
+
+def features():
+    """What the programs take, by themselves: the words of options, endings of files, what recordings become; and elements by the reference of model.toml, which is
+    written from the code."""
+    play, export, push = (printed("runtime/palpate-runtime", command) for command in ("play", "export", "push"))
+    has = {}
+    for option in ("--solver", "--integrator", "--overlay-law", "--contact", "--tool", "--device"):
+        values = re.search(rf"^ +{option} (\S+)", play, re.MULTILINE)[1]
+        has[option] = set(re.findall(r"(?:^|\|)([a-z][a-z0-9-]*)", re.sub(r"\[.*?\]", "", values)))
+    has["files"] = set(re.findall(r"[(, ](\.[a-z]+)\b", push[:push.index("Handed on")]))
+    has["exports"] = set(re.findall(r"^ +(--\w+) OUT", export, re.MULTILINE))
+    table = (book.SOURCE / "docs/reference/model-keys.md").read_text().split("| geometry | elements")[1].split("\n\n")[0]
+    has["elements"] = {word for row in table.splitlines()[2:] for word in re.findall('"(\\w+)"', row.split("|")[2])}
+    return has
+
+
+class Features(unittest.TestCase):
+    """Pages that list what the programs take lack nothing and have no more."""
+
+    def test_lists_are_those_of_the_programs(self):
+        self.assertEqual(list(book.stale_features(book.SOURCE, features())), [])
+
+    def test_what_is_new_or_gone_is_noticed(self):
+        has = features()
+        self.assertIn("newmark", has["--integrator"])
+        has["--integrator"] = has["--integrator"] - {"newmark"} | {"rk8"}
+        self.assertEqual(list(book.stale_features(book.SOURCE, has)),
+                         [f"{page}: {first}: {what}" for page, first in (("docs/comparison.md", "their integrators"), ("docs/live.md", "`--integrator`"))
+                          for what in ("newmark is in no program", "rk8 is not told")])
 
 
 class Rules(unittest.TestCase):
