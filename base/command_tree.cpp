@@ -32,7 +32,8 @@ ArgumentText argument_text(const CLI::Option& option) {
 }
 
 bool is_word(char letter) {
-  return std::islower(static_cast<unsigned char>(letter)) != 0 || letter == '-';
+  const auto byte = static_cast<unsigned char>(letter);
+  return std::islower(byte) != 0 || std::isdigit(byte) != 0 || letter == '-';
 }
 
 /// The pattern of a file that a name in capitals stands for, "" for what is none.
