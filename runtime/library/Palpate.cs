@@ -123,7 +123,15 @@ namespace Palpate
         public double GreensError;
     }
 
-    /// <summary>One body and the tools that touch it. One thread steps (Step, Felt, SetTool, Reset, Record, EndRecording); others may draw
+    /// <summary>A place where a tool and the surface press on each other: on the surface, with its normal, out of the body; the force is that on the tool.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Contact
+    {
+        internal UIntPtr size;
+        public Vector Position, Normal, Force;
+    }
+
+    /// <summary>One body and the tools that touch it. One thread steps (Step, Felt, Contacts, SetTool, Reset, Record, EndRecording); others may draw
     /// at the same time (Rest, Surface, Displacement, Stress) and dispose. What comes after that throws ObjectDisposedException, and what
     /// a second thread that steps asks for InvalidOperationException.</summary>
     public sealed class Session : IDisposable
@@ -187,6 +195,15 @@ namespace Palpate
             var felt = new Felt { size = (UIntPtr)Marshal.SizeOf(typeof(Felt)) };
             if (Done(Native.palpate_get(Open(), tool, ref felt)) != 0) throw new ArgumentOutOfRangeException("tool");
             return felt;
+        }
+
+        /// <summary>Fills the array with the first contacts of a tool in the last tick, and says how many there are.</summary>
+        public int Contacts(Contact[] contacts, int tool = 0)
+        {
+            if (contacts.Length > 0) contacts[0].size = (UIntPtr)Marshal.SizeOf(typeof(Contact));
+            int count;
+            if (Done(Native.palpate_get_contacts(Open(), tool, contacts, contacts.Length, out count)) != 0) throw new ArgumentOutOfRangeException("tool");
+            return count;
         }
 
         /// <summary>What a tool is from the next tick on; false where its shape is another, or a value makes no sense.</summary>
@@ -340,6 +357,8 @@ namespace Palpate
         internal static extern uint palpate_step(IntPtr session, ref Pose pose);
         [DllImport(Library)]
         internal static extern int palpate_get(IntPtr session, int tool, ref Felt result);
+        [DllImport(Library)]
+        internal static extern int palpate_get_contacts(IntPtr session, int tool, [In, Out] Contact[] contacts, int room, out int count);
         [DllImport(Library)]
         internal static extern int palpate_set_tool(IntPtr session, int number, ref Tool tool);
         [DllImport(Library)]

@@ -19,6 +19,7 @@
 #include "meshes/node_vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
+#include "runtime/background/seen_contact.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
 #include "runtime/library/c_error.h"
@@ -392,6 +393,29 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
   if (!write_struct(felt, result)) return -1;
   if (!loop) return refused(session);
   return exists ? 0 : -1;
+}
+
+int palpate_get_contacts(const palpate_session* session, int tool, palpate_contact* contacts, int room,
+                         int* count) noexcept {
+  const Inside<OwnLoop> loop(const_cast<palpate_session*>(session), Use::alone);  // NOLINT: as in look
+  if (!loop) return refused(session);
+  if (count == nullptr || room < 0 || tool < 0 || static_cast<std::size_t>(tool) >= loop->state.tools.size())
+    return -1;
+  if (room > 0 && (contacts == nullptr || !is_size_of<palpate_contact>(contacts->size))) return -1;
+  *count = 0;
+  for (const ContactPoint& contact : loop->state.contacts()) {
+    if (contact.tool != tool || contact.force.isZero(0.0)) continue;
+    if (*count < room) {
+      const SeenContact seen = seen_contact(loop->body, loop->state, contact);
+      palpate_contact filled{};
+      copy(seen.position, filled.position);
+      copy(seen.normal, filled.normal);
+      copy(contact.force, filled.force);
+      write_struct(filled, contacts, static_cast<std::size_t>(*count));
+    }
+    ++*count;
+  }
+  return 0;
 }
 
 int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) noexcept {

@@ -4,11 +4,12 @@
  * in the plane, z of what you give is ignored and z of what you get is 0 (of a torque, only z is not).
  *
  * Nothing here throws, and nothing prints. Sessions are independent of each other. Of one session, one thread
- * uses the functions of the loop (palpate_step, palpate_get, palpate_set_tool, palpate_reset, palpate_record
- * and palpate_record_end), and any others may use those of the surface meanwhile. Where a second thread uses
- * the loop at the same moment, or the session has ended, the call does nothing and says so: it returns
- * PALPATE_NOT_STEPPED or PALPATE_ERROR_STATE. NULL for a session or an array is refused likewise, by -1.
- * "Real-time safe" below means: no memory is taken, no lock, no system call, and the time is bounded.
+ * uses the functions of the loop (palpate_step, palpate_get, palpate_get_contacts, palpate_set_tool,
+ * palpate_reset, palpate_record and palpate_record_end), and any others may use those of the surface
+ * meanwhile. Where a second thread uses the loop at the same moment, or the session has ended, the call does
+ * nothing and says so: it returns PALPATE_NOT_STEPPED or PALPATE_ERROR_STATE. NULL for a session or an array
+ * is refused likewise, by -1. "Real-time safe" below means: no memory is taken, no lock, no system call, and
+ * the time is bounded.
  *
  * Each struct begins with its size, so that later versions can add members at its end: begin yours with its
  * PALPATE_..._INIT, which sets the size and the defaults, then change what is to differ. A program that was
@@ -199,6 +200,29 @@ typedef struct palpate_result {
  * zero, or the size is refused, and nothing is written; PALPATE_ERROR_STATE, and all is zero. Real-time safe.
  */
 int palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
+
+/* A place where a tool and the surface press on each other. */
+typedef struct palpate_contact {
+  size_t size;        /* sizeof(palpate_contact) */
+  double position[3]; /* of the surface now [m] */
+  double normal[3];   /* of the surface, out of the body, length 1 */
+  double force[3];    /* on the tool; those of a tool are together what its contact asks for [N] */
+} palpate_contact;
+
+/* All zero. */
+#define PALPATE_CONTACT_INIT                                     \
+  {                                                              \
+    sizeof(palpate_contact), {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, { \
+      0.0, 0.0, 0.0                                              \
+    }                                                            \
+  }
+
+/* The contacts of a tool in the last tick: `count` becomes how many there are, as in palpate_result, and the
+ * first `room` elements of `contacts` are filled, whose size the first one tells. With a room of 0 it only
+ * counts. Returns 0; -1 where the number is none, the room is negative or the size is refused, and nothing is
+ * written; PALPATE_ERROR_STATE. Real-time safe; a function of the loop. */
+int palpate_get_contacts(const palpate_session* session, int tool, palpate_contact* contacts, int room,
+                         int* count) PALPATE_NOEXCEPT;
 
 /* What a tool is from the next tick on: its coupling, largest force, friction, reach and hand-over. Its shape
  * (radius, length, disc_radius) stays that of palpate_create: a surface cannot be pushed aside within a tick.

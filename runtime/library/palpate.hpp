@@ -122,6 +122,14 @@ class Session {
     return result;
   }
 
+  /// Where a tool and the surface press on each other; none where there is no such tool. Allocates.
+  [[nodiscard]] std::vector<palpate_contact> contacts(int tool = 0) const {
+    std::vector<palpate_contact> found(static_cast<std::size_t>(felt(tool).contacts), PALPATE_CONTACT_INIT);
+    int count = 0;
+    palpate_get_contacts(session_.get(), tool, found.data(), static_cast<int>(found.size()), &count);
+    return found;
+  }
+
   /// What a tool is from the next tick on; false where it cannot become that. Real-time safe.
   bool set_tool(int number, const palpate_tool& tool) noexcept {
     return palpate_set_tool(session_.get(), number, &tool) == 0;

@@ -35,15 +35,16 @@ std::optional<Struct> read_struct(const Struct* first, std::size_t k, const Stru
   return result;
 }
 
-/// Gives the caller the members that its struct has; those that are not known here become 0.
-/// False, with nothing written, where it is null or its size cannot be.
+/// Gives the caller the members that its struct has, element `k` of an array whose first element tells the
+/// size of them all; those that are not known here become 0. False, with nothing written, where it is null or
+/// its size cannot be.
 template <typename Struct>
-bool write_struct(Struct from, Struct* to) noexcept {
-  if (to == nullptr) return false;
-  const std::size_t size = to->size;
+bool write_struct(Struct from, Struct* first, std::size_t k = 0) noexcept {
+  if (first == nullptr) return false;
+  const std::size_t size = first->size;
   if (!is_size_of<Struct>(size)) return false;
   from.size = size;
-  auto* bytes = reinterpret_cast<std::byte*>(to);
+  std::byte* bytes = reinterpret_cast<std::byte*>(first) + k * size;
   std::memcpy(bytes, &from, std::min(size, sizeof(Struct)));
   std::fill(bytes + std::min(size, sizeof(Struct)), bytes + size, std::byte{0});
   return true;

@@ -67,6 +67,8 @@ class Clients(unittest.TestCase):
         self.assertGreater(numbers[149, 2], 0.01, "it is pressed")
         self.assertLess(numbers[399, 0], -1e-3, "it rubs")
         self.assertLess(numbers[-1, 2], -1e-3, "it pulls")
+        self.assertGreater(numbers[149, 8], 0.9, "a contact is on the top")
+        self.assertGreater(numbers[149, 11], 0.9, "whose normal points up")
 
     def test_record_what_a_replay_repeats_to_the_last_bit(self):
         felt = []

@@ -6,6 +6,7 @@ import pathlib
 import tempfile
 import threading
 import time
+import tomllib
 import typing
 import unittest
 import urllib.request
@@ -20,7 +21,7 @@ from palpate import library  # by way of programs
 
 STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
            "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts,
-           "palpate_record_options": library.CRecordOptions}
+           "palpate_record_options": library.CRecordOptions, "palpate_contact": library.CContact}
 
 
 def compiled(folder, source):
@@ -180,6 +181,61 @@ class Forces(PythonTest):
             self.assertLess(session.simplices.max(), len(u))
             with self.assertRaises(IndexError):
                 session.felt(2)
+
+
+class Meshes(PythonTest):
+    """Bodies of arrays: the cube of the shared file again, and others of a few elements."""
+
+    soft = {"material": {"youngs_modulus": 1.0, "poissons_ratio": 0.3}, "fixed": [{"lowest": {"axis": "z", "percent": 1}}]}
+
+    def bake(self, points, elements, **description):
+        file = self.folder / "in memory.palpate.hdf"
+        palpate.bake_mesh(points, elements, file, force=True, **description)
+        return palpate.Body(file)
+
+    def test_finite_elements_become_the_same_body(self):
+        with palpate.Body(self.cube) as cube:
+            nodes, elements = cube.nodes, cube.elements
+            told = tomllib.loads((self.shared / "cube.toml").read_text())
+            description = {key: told[key] for key in ("material", "fixed", "storage")}
+            with self.bake(nodes, elements, **description) as body:
+                numpy.testing.assert_allclose(body.greens(body.stored_nodes), cube.greens(cube.stored_nodes), rtol=1e-9, atol=1e-12)
+            half = (nodes[elements].mean(axis=1)[:, 0] < 0.5).astype(int)
+            materials = [{"youngs_modulus": numpy.float64(E), "poissons_ratio": 0.3, "regions": [k]} for k, E in enumerate((1.0, 4.0))]
+            with self.bake(1000 * nodes, elements, regions=half, geometry={"scale": 1e-3}, material=materials, fixed=description["fixed"]) as body:
+                numpy.testing.assert_allclose(body.nodes, nodes, atol=1e-12)
+                self.assertEqual(body.file["material/isotropic"][:, 0].tolist(), [1.0, 4.0])
+        self.assertEqual(run(PRECOMPUTE, "verify", self.folder / "in memory.palpate.hdf").returncode, 0, "its sources are beside it")
+
+    def test_a_surface_is_filled(self):
+        points = numpy.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+        squares = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+        triangles = numpy.array([corners for a, b, c, d in squares for corners in ((a, b, c), (a, c, d))], numpy.int32)
+        with self.bake(points, triangles, mesh={"element": "tet10", "edge_length": 0.5, "remesh": True}, **self.soft) as body:
+            self.assertEqual(body.elements.shape[1], 10)
+            numpy.testing.assert_allclose([body.nodes.min(axis=0), body.nodes.max(axis=0)], [[0] * 3, [1] * 3], atol=1e-9)
+        with self.bake(points, numpy.array([[0, 1, 3, 2, 4, 5, 7, 6]]), **self.soft) as body:
+            self.assertEqual(body.elements.shape, (1, 8))
+        with self.bake(points[:4, :2], [[0, 1, 3, 2]], plane="stress", thickness=0.1, material=self.soft["material"],
+                       fixed=[{"lowest": {"axis": "y", "percent": 1}}]) as body:
+            self.assertEqual(len(body.nodes), 4)
+
+    def test_what_is_wrong_is_told(self):
+        square = numpy.eye(4, 3)
+        for points, elements, options, words in (
+                (square, [[0, 1, 2, 3]], {"fixed": self.soft["fixed"]}, "material"), (square, [[0, 1, 2, 3]], {"colour": "red", **self.soft}, "colour"),
+                (square, [[0, 1, 2, 9]], self.soft, "a node number"), (square * numpy.nan, [[0, 1, 2, 3]], self.soft, "mesh.vtk"),
+                (square, [[0, 1, 2]], self.soft, "open"), (square, [[0.0, 1, 2, 3]], self.soft, "elements are"), (square.ravel(), [[0, 1, 2, 3]], self.soft, "points are"),
+                (square, [[0, 1]], self.soft, "2 nodes"), (square, [[0, 1, 2, 3]], {"regions": [1, 2], **self.soft}, "regions are"),
+                (square, [[0, 1, 2, 3]], {**self.soft, "name": object()}, "no value")):
+            with self.subTest(words), self.assertRaisesRegex(palpate.Error, words):
+                self.bake(points, elements, **options)
+        with self.assertRaises(palpate.Error) as failed:
+            self.bake(square, [[0, 1, 2, 3]], material=self.soft["material"])
+        self.assertIn("[[fixed]]", failed.exception.hint, "all lines of it")
+        self.write("in memory.mesh/model.toml", "mine")
+        with self.assertRaisesRegex(palpate.Error, "not written by bake_mesh"):
+            self.bake(square, [[0, 1, 2, 3]], **self.soft)
 
 
 class Files(PythonTest):
@@ -385,7 +441,7 @@ class Misuse(PythonTest):
         session = palpate.Session(self.cube, palpate.Tool())
         session.close()
         session.close()
-        for use in (lambda: session.step((0, 0, 2)), lambda: session.felt(0), lambda: session.set_tool(0, palpate.Tool()), session.reset,
+        for use in (lambda: session.step((0, 0, 2)), lambda: session.felt(0), session.contacts, lambda: session.set_tool(0, palpate.Tool()), session.reset,
                     lambda: session.record(self.folder / "a.mcap"), session.end_recording, lambda: session.rest, lambda: session.simplices,
                     session.displacement, session.stress):
             with self.assertRaisesRegex(palpate.Error, "the session is closed"):
@@ -411,7 +467,7 @@ class Misuse(PythonTest):
             self.session(max_contacts=8.5)
         session = self.session()
         for number in (-1, 1, 2**32, 2**40, -2**32):
-            for use in (lambda: session.felt(number), lambda: session.put(number, (0, 0, 2)), lambda: session.set_tool(number, session.tools[0])):
+            for use in (lambda: session.felt(number), lambda: session.contacts(number), lambda: session.put(number, (0, 0, 2)), lambda: session.set_tool(number, session.tools[0])):
                 with self.assertRaises(IndexError):
                     use()
             with self.assertRaises(palpate.Error):

@@ -11,10 +11,10 @@ All units are SI. Needs numpy; Body needs h5py too. The book describes it on its
 from .files import Body, Recording, read
 from .library import Error
 from .loop import Loop
-from .programs import bake, probe
-from .session import Felt, Overlay, Session, Tool
+from .programs import bake, bake_mesh, probe
+from .session import Contacts, Felt, Overlay, Session, Tool
 from .viewer import Viewer
 
-__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "probe",
-           "read"]
+__all__ = ["Body", "Contacts", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "bake_mesh",
+           "probe", "read"]
 __version__ = "0.1.0"

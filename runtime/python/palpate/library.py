@@ -31,8 +31,7 @@ class Error(Exception):
         """By what a program or the library says: lines `error: ...` and `hint: ...`."""
         lines = text.strip().splitlines()
         told = [re.sub(r"^error: (palpate_\w+: )?", "", line) for line in lines if line.startswith("error: ")]  # without functions of C
-        hints = [line.removeprefix("hint: ") for line in lines if line.startswith("hint: ")]
-        return cls("\n".join(told or lines), "\n".join(hints), code)
+        return cls("\n".join(told or lines), text.strip().partition("\nhint: ")[2], code)
 
 
 def whole(value: int, what: str, least: int = -(1 << 31), most: int = (1 << 31) - 1) -> int:
@@ -83,6 +82,10 @@ class CResult(Structure):
                 ("left_out", c_int), ("greens_error", c_double)]
 
 
+class CContact(Structure):
+    _fields_ = [("size", c_size_t), ("position", c_double * 3), ("normal", c_double * 3), ("force", c_double * 3)]
+
+
 class CCounts(Structure):
     _fields_ = [("size", c_size_t), ("nodes", c_int32), ("simplices", c_int32), ("corners", c_int32)]
 
@@ -104,6 +107,7 @@ FUNCTIONS = {
     "palpate_destroy": (None, [c_void_p]),
     "palpate_step": (c_uint32, [c_void_p, POINTER(CPose)]),
     "palpate_get": (c_int, [c_void_p, c_int, POINTER(CResult)]),
+    "palpate_get_contacts": (c_int, [c_void_p, c_int, POINTER(CContact), c_int, POINTER(c_int)]),
     "palpate_set_tool": (c_int, [c_void_p, c_int, POINTER(CTool)]),
     "palpate_reset": (c_int, [c_void_p]),
     "palpate_surface_counts": (c_int, [c_void_p, POINTER(CCounts)]),

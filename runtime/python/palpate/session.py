@@ -13,12 +13,13 @@ from typing import Any
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
-from .library import (ERROR_STATE, NOT_STEPPED, Array, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, Numbers,
+from .library import (ERROR_STATE, NOT_STEPPED, Array, CContact, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, Numbers,
                       load, path_bytes, whole)
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)
 POSE = numpy.dtype(CPose)
+CONTACT = numpy.dtype(CContact)
 
 
 @dataclasses.dataclass
@@ -67,6 +68,15 @@ class Felt:
     status: frozenset[str]  # of the tick, such as "not_converged"; empty where all is well
 
 
+@dataclasses.dataclass
+class Contacts:
+    """Where a tool and the surface press on each other, a row for each place."""
+
+    position: Array  # [K, 3] of the surface
+    normal: Array  # [K, 3] of the surface, out of the body
+    force: Array  # [K, 3] on the tool
+
+
 def felt_of(result: CResult, status: frozenset[str]) -> Felt:
     members: dict[str, Any] = {}
     for name, kind in CResult._fields_[1:]:
@@ -88,7 +98,7 @@ def c_overlay(overlay: Overlay | None) -> Any:
 
 
 class Session:
-    """One body and the tools that touch it. One thread steps (`put`, `step`, `play`, `felt`, `set_tool`, `reset`, `record`,
+    """One body and the tools that touch it. One thread steps (`put`, `step`, `play`, `felt`, `contacts`, `set_tool`, `reset`, `record`,
     `end_recording`); others may draw at the same time (`rest`, `simplices`, `displacement`, `stress`) and close: what comes
     later, or from a second thread that steps, is an Error.
 
@@ -195,6 +205,17 @@ class Session:
         result = CResult(ctypes.sizeof(CResult))
         self._call("palpate_get", self._number(tool), ctypes.byref(result))
         return felt_of(result, self.status)
+
+    def contacts(self, tool: int = 0) -> Contacts:
+        """The contacts of a tool in the last tick. Throws IndexError where there is no such tool."""
+        number, count = self._number(tool), ctypes.c_int()
+        self._call("palpate_get_contacts", number, None, 0, ctypes.byref(count))
+        found = (CContact * count.value)()
+        if found:
+            found[0].size = ctypes.sizeof(CContact)
+            self._call("palpate_get_contacts", number, found, len(found), ctypes.byref(count))
+        rows = numpy.frombuffer(found, CONTACT) if found else numpy.empty(0, CONTACT)
+        return Contacts(*(rows[name].copy() for name in ("position", "normal", "force")))
 
     def set_tool(self, number: int, tool: Tool) -> None:
         """What a tool is from the next tick on; its shape stays. Throws Error where the shape is another, or a value makes no

@@ -33,8 +33,10 @@ static class Client
                     watch.Restart();
                     uint status = session.Step(pose);
                     Felt felt = session.Felt();
+                    var touched = new Contact[1];
+                    session.Contacts(touched);
                     times.Add(watch.ElapsedTicks * 1000000000 / Stopwatch.Frequency);
-                    Console.WriteLine(status + Bits(felt.Force) + Bits(felt.Torque));
+                    Console.WriteLine(status + Bits(felt.Force) + Bits(felt.Torque) + Bits(touched[0].Position) + Bits(touched[0].Normal));
                 }
                 if (words.Length > 1) session.EndRecording();
                 times.Sort();

@@ -76,7 +76,7 @@ static class Misuse
         session.Dispose();
         var uses = new List<Action>
         {
-            () => session.Step(Pressing), () => session.Step(new[] { Pressing }), () => session.Felt(), () => session.SetTool(0, Tool.Sphere(0.1)),
+            () => session.Step(Pressing), () => session.Step(new[] { Pressing }), () => session.Felt(), () => session.Contacts(new Contact[2]), () => session.SetTool(0, Tool.Sphere(0.1)),
             session.Reset, () => session.Record("a.mcap"), session.EndRecording, () => session.Rest(new double[3 * nodes]),
             () => session.Surface(new int[session.Corners * session.Simplices]), () => session.Displacement(new double[3 * nodes]),
             () => session.Stress(new float[nodes], new float[nodes]),

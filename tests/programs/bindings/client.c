@@ -56,10 +56,15 @@ int main(int count, char** words) {
     const int64_t begin = now();
     const uint32_t status = palpate_step(session, &pose);
     palpate_get(session, 0, &felt);
+    palpate_contact touched = PALPATE_CONTACT_INIT;
+    int contacts = 0;
+    palpate_get_contacts(session, 0, &touched, 1, &contacts);
     times[ticks++] = now() - begin;
     printf("%" PRIu32, status);
     print(felt.force);
     print(felt.torque);
+    print(touched.position);
+    print(touched.normal);
     putchar('\n');
   }
   if (count > 2 && palpate_record_end(session, error, sizeof error) != PALPATE_OK) {

@@ -35,10 +35,14 @@ int main(int count, char** words) {
       const auto begin = std::chrono::steady_clock::now();
       const std::uint32_t status = session.step(pose);
       const palpate_result felt = session.felt();
+      std::vector<palpate_contact> touched = session.contacts();
+      touched.push_back(PALPATE_CONTACT_INIT);
       times.push_back(std::chrono::nanoseconds(std::chrono::steady_clock::now() - begin).count());
       std::printf("%" PRIu32, status);
       print(felt.force);
       print(felt.torque);
+      print(touched[0].position);
+      print(touched[0].normal);
       std::printf("\n");
     }
     if (count > 2) session.end_recording();

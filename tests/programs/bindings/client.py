@@ -25,8 +25,10 @@ def main():
         pose = [float(word) for word in pose]
         begin = time.perf_counter_ns()
         felt = session.step(pose[:3], pose[3:], grab != "0")
+        touched = session.contacts()
         times.append(time.perf_counter_ns() - begin)
-        print(str(sum(number[name.encode()] for name in felt.status)) + bits(felt.force) + bits(felt.torque))
+        print(str(sum(number[name.encode()] for name in felt.status)) + bits(felt.force) + bits(felt.torque) +
+              bits([*touched.position.ravel(), 0, 0, 0][:3]) + bits([*touched.normal.ravel(), 0, 0, 0][:3]))
     if len(sys.argv) > 2:
         session.end_recording()
     times.sort()

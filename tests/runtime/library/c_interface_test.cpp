@@ -629,6 +629,46 @@ TEST(CInterfaceErrors, NothingHappensWithoutPosesOrATool) {
   }
 }
 
+/// On a sphere a contact lies on its surface, and the normals point to its middle.
+TEST(CInterface, ContactsLieOnTheToolAndAddUpToItsForce) {
+  const Session session = open("cube2", {sphere(0.4), sphere(0.1)});
+  palpate_pose poses[] = {{sizeof(palpate_pose), {0.5, 0.5, 0.0}, {1.0, 0.0, 0.0, 0.0}, 0},
+                          PALPATE_POSE_INIT};
+  poses[1].position[2] = 5.0;
+  for (int tick = 0; tick < 400; ++tick) {
+    poses[0].position[2] = std::max(1.35, 1.5 - 0.001 * tick);
+    palpate_step(session.get(), poses);
+  }
+  const palpate_result felt = result_of(session.get(), 0);
+  std::vector<palpate_contact> found(40, PALPATE_CONTACT_INIT);
+  int count = -1;
+  ASSERT_EQ(palpate_get_contacts(session.get(), 0, found.data(), 40, &count), 0);
+  ASSERT_EQ(count, felt.contacts);
+  ASSERT_GT(count, 0);
+  Vec3 sum = Vec3::Zero();
+  for (int k = 0; k < count; ++k) {
+    const palpate_contact& contact = found[static_cast<std::size_t>(k)];
+    const Vec3 apart = vector(felt.tool_position) - vector(contact.position);
+    EXPECT_NEAR(apart.norm(), 0.4, 1e-3);
+    EXPECT_NEAR(vector(contact.normal).norm(), 1.0, 1e-12);
+    EXPECT_GT(vector(contact.normal).dot(apart.normalized()), 0.99);
+    EXPECT_GT(vector(contact.normal).dot(vector(contact.force)), 0.0);
+    sum += vector(contact.force);
+  }
+  EXPECT_LT((sum - vector(felt.force)).norm(), 1e-6 * sum.norm());
+
+  int counted = -1;
+  EXPECT_EQ(palpate_get_contacts(session.get(), 0, nullptr, 0, &counted), 0);
+  EXPECT_EQ(counted, count);
+  EXPECT_EQ(palpate_get_contacts(session.get(), 1, found.data(), 40, &counted), 0);
+  EXPECT_EQ(counted, 0) << "the other tool touches nothing";
+  for (const int tool : {-1, 2})
+    EXPECT_EQ(palpate_get_contacts(session.get(), tool, found.data(), 40, &counted), -1);
+  EXPECT_EQ(palpate_get_contacts(session.get(), 0, found.data(), -1, &counted), -1);
+  found[0].size = 3;
+  EXPECT_EQ(palpate_get_contacts(session.get(), 0, found.data(), 40, &counted), -1);
+}
+
 // What a program compiled with an older palpate.h has: the first members only.
 struct OldTool {
   std::size_t size;
@@ -976,6 +1016,8 @@ struct Room {
   palpate_options options = PALPATE_OPTIONS_INIT;
   palpate_record_options record_options = PALPATE_RECORD_OPTIONS_INIT;
   palpate_result result = PALPATE_RESULT_INIT;
+  palpate_contact contact = PALPATE_CONTACT_INIT;
+  int count = 0;
   palpate_counts counts = PALPATE_COUNTS_INIT;
   palpate_recording_counts recording_counts = PALPATE_RECORDING_COUNTS_INIT;
   palpate_recorded_tick tick = PALPATE_RECORDED_TICK_INIT;
@@ -1001,6 +1043,7 @@ std::vector<Call> calls(palpate_session* session, palpate_recording* recording, 
       PALPATE_CALL(palpate_create_with_options, model, &room.tool, 1, 8, &room.options, error, size),
       PALPATE_CALL(palpate_step, session, &room.pose),
       PALPATE_CALL(palpate_get, session, 0, &room.result),
+      PALPATE_CALL(palpate_get_contacts, session, 0, &room.contact, 1, &room.count),
       PALPATE_CALL(palpate_set_tool, session, 0, &room.tool),
       PALPATE_CALL(palpate_reset, session),
       PALPATE_CALL(palpate_record, session, room.record.c_str(), &room.record_options, error, size),

@@ -499,6 +499,7 @@ TEST(OwnLoop, MakesNoHeapCall) {
   palpate_surface_counts(session, &counts);
   std::vector<double> xyz(3 * static_cast<std::size_t>(counts.nodes));
   palpate_result result = PALPATE_RESULT_INIT;
+  std::vector<palpate_contact> contacts(32, PALPATE_CONTACT_INIT);
   int touching = 0;
   const auto loop = [&] {
     for (int tick = 0; tick < 1000; ++tick) {
@@ -509,6 +510,8 @@ TEST(OwnLoop, MakesNoHeapCall) {
                               tick % 300 > 250 ? 1 : 0};
       palpate_step(session, &pose);
       palpate_get(session, 0, &result);
+      int found = 0;
+      EXPECT_EQ(palpate_get_contacts(session, 0, contacts.data(), 32, &found), 0);
       tool.friction = 0.3 + 1e-4 * tick;
       EXPECT_EQ(palpate_set_tool(session, 0, &tool), 0);
       palpate_surface_displacement(session, xyz.data());
