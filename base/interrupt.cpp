@@ -1,5 +1,6 @@
 #include "base/interrupt.h"
 
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <unistd.h>
 
@@ -20,8 +21,17 @@ std::atomic<bool> noted_only{false};
 std::atomic<pid_t> owner{0};  // a child that was forked is silent
 std::atomic<const char*> late_text{nullptr};
 std::string kept_text;  // of the guard, which late_text points to
+std::atomic<const char*> begun_file{nullptr};
+std::string kept_file;  // of the guard, which begun_file points to
+
+void remove_begun_file() {
+  struct stat begun = {};
+  const char* const file = begun_file;
+  if (file != nullptr && ::stat(file, &begun) == 0 && begun.st_size == 0) ::unlink(file);
+}
 
 void end_late(int) {
+  remove_begun_file();
   if (const char* const text = late_text; text != nullptr) [[maybe_unused]]
     const ssize_t written = ::write(STDERR_FILENO, text, std::strlen(text));
   ::_exit(exit_interrupted);
@@ -33,8 +43,10 @@ void handle(int signal) {
     if (signal != SIGUSR1 && late_text != nullptr) end_soon(late_text);
     return;
   }
-  if (::getpid() == owner) [[maybe_unused]]
-    const ssize_t written = ::write(STDERR_FILENO, ending, sizeof ending - 1);
+  if (::getpid() == owner) {
+    remove_begun_file();
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, ending, sizeof ending - 1);
+  }
   ::_exit(exit_interrupted);
 }
 
@@ -60,7 +72,13 @@ InterruptGuard::InterruptGuard() {
 }
 
 InterruptGuard::~InterruptGuard() {
+  begun_file = nullptr;
   for (std::size_t k = 0; k < signals.size(); ++k) sigaction(signals[k], &before_[k], nullptr);
+}
+
+void InterruptGuard::remove_if_empty(const std::string& file) {
+  kept_file = file;
+  begun_file = kept_file.c_str();
 }
 
 void InterruptGuard::note_from_now_on(const std::string& text) {

@@ -22,6 +22,8 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
+  /// Where a signal ends the process, this file is removed if it is empty.
+  void remove_if_empty(const std::string& file);
   /// `text` is printed where the run does not end by itself. Empty: it may take as long as it needs.
   void note_from_now_on(const std::string& text);
   [[nodiscard]] bool requested() const noexcept;

@@ -16,6 +16,7 @@
 #include "base/limits/child_seal.h"
 #include "base/parallel.h"
 #include "formats/begun_model.h"
+#include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
@@ -545,6 +546,30 @@ std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& pl
   return BakePart{number, parts, std::vector<PieceRange>(two ? 2 : 1, pieces)};
 }
 
+/// The output's journal, held from the start on, so that a second run is refused before it has done all that
+/// comes before the columns. One that the run leaves empty is removed.
+class Claim {
+ public:
+  /// Throws Error where another process holds it.
+  Claim(const std::filesystem::path& output, InterruptGuard& interrupt)
+      : path_(output.string() + ".progress"), journal_(std::in_place, path_) {
+    interrupt.remove_if_empty(path_);
+  }
+  ~Claim() {
+    std::error_code none;
+    if (journal_ && std::filesystem::file_size(path_, none) == 0 && !none) journal_->remove();
+  }
+  Claim(const Claim&) = delete;
+  Claim& operator=(const Claim&) = delete;
+
+  /// The writer takes it from here.
+  void hand_over() { journal_.reset(); }
+
+ private:
+  std::string path_;
+  std::optional<Journal> journal_;
+};
+
 /// Begins the file, or goes on with it: a part's own, the leader's, or that which the leader has begun.
 std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::optional<BakePart>& part,
                                          const Model& model, Precision precision, bool of_parts, Team& team) {
@@ -570,7 +595,9 @@ class Bake {
         options_(options),
         team_(team),
         progress_(progress),
-        interrupt_(interrupt) {}
+        interrupt_(interrupt) {
+    if (!options.dry_run && (options.part || team.leads())) claim_.emplace(options.output, interrupt);
+  }
 
   BakeResult run() {
     if (description_.scope == Scope::none) return write_without_greens();
@@ -622,6 +649,7 @@ class Bake {
   Team& team_;
   Progress& progress_;
   InterruptGuard& interrupt_;
+  std::optional<Claim> claim_;
 
   Model model_;
   std::optional<ElasticBody> elastic_;
@@ -672,6 +700,7 @@ BakeResult Bake::write_without_greens() {
   if (options_.dry_run) return BakeResult::planned;
   if (!team_.leads()) return BakeResult::done;
   progress_.begin(write_stage);
+  claim_->hand_over();
   ModelWriter(options_.output, model_, precision_, Leftovers::discard).finish({}, nullptr, options_.keep);
   progress_.line(fmt::format("{} written", options_.output.string()));
   if (!warning_.empty()) progress_.warn(warning_);
@@ -816,6 +845,7 @@ BakeResult Bake::describe_and_solve() {
     progress_.line("interrupted: nothing was written");
     return BakeResult::interrupted;
   }
+  if (claim_) claim_->hand_over();
   const std::unique_ptr<ModelWriter> writer =
       open_writer(options_, part_, model_, precision_, fell_back_.empty(), team_);
   model_.overlay = {};  // written by now

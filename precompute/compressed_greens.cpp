@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "base/error.h"
 #include "precompute/compression/certificate.h"
@@ -22,8 +23,8 @@ constexpr std::int64_t touches = 64;        // of each number of nodes
 constexpr std::int64_t touch_matrices = 9;  // that each thread has of a touch, three of them twice as wide
 constexpr double typical_rank = 45.0;       // of the default tolerance (measured)
 constexpr std::int64_t recompression_copies = 6;  // of the far part: skeletons are larger (measured)
-constexpr double far_share = 1.7;                 // of the time of near pairs (measured)
-constexpr double touch_share = 0.2;               // likewise
+constexpr double far_share = 2.5;                 // of the time of near pairs (measured)
+constexpr double touch_share = 1.6;               // of that of as many columns of near pairs (measured)
 
 constexpr const char* near_stage = "near pairs";
 constexpr const char* sample_stage = "random loads";
@@ -112,7 +113,10 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
   plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame);
   plan.sample_seconds = seconds_per_flop * random_loads * 4.0 * static_cast<double>(factor.entries());
   plan.far_seconds = far_share * plan.near_seconds;
-  plan.touch_seconds = touch_share * plan.near_seconds;
+  const auto touch_columns =
+      static_cast<double>(touches * model.dimension() *
+                          std::accumulate(certified_nodes.begin(), certified_nodes.end(), Index{0}));
+  plan.touch_seconds = touch_share * plan.near_seconds * touch_columns / order;
   return plan;
 }
 

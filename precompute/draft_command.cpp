@@ -5,12 +5,14 @@
 #include <charconv>
 #include <cstdio>
 #include <iostream>
+#include <optional>
 
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/program.h"
 #include "precompute/description/not_a_description.h"
 #include "precompute/draft/questions.h"
+#include "precompute/progress.h"
 
 namespace palpate {
 namespace {
@@ -120,7 +122,13 @@ std::string described(const std::string& model, const DraftArguments& arguments,
   DraftOptions options = options_of(arguments);
   options.keep = keep;
   options.elsewhere = output.parent_path();
-  return draft(model, options, arguments.given(), tell).string();
+  std::optional<Waiting> waiting(std::in_place, "reading " + model + " and repairing it where needed");
+  return draft(model, options, arguments.given(),
+               [&](const std::string& line) {
+                 waiting.reset();
+                 tell(line);
+               })
+      .string();
 }
 
 int run_new(const std::string& file, const DraftArguments& arguments) {

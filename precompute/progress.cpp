@@ -162,4 +162,15 @@ void Progress::tick(const std::stop_token& stop) {
   }
 }
 
+Waiting::Waiting(std::string what, std::chrono::milliseconds silence)
+    : teller_(without_signals([what = std::move(what), silence](const std::stop_token& stop) {
+        std::mutex mutex;
+        std::condition_variable_any wake;
+        std::unique_lock lock(mutex);
+        if (wake.wait_for(lock, stop, silence, [&] { return stop.stop_requested(); })) return;
+        Progress progress;
+        progress.begin(what);
+        wake.wait(lock, stop, [] { return false; });
+      })) {}
+
 }  // namespace palpate

@@ -77,4 +77,14 @@ class Progress {
   std::jthread ticker_;     // last, so that it ends before what it uses
 };
 
+/// Tells that work goes on which says nothing of itself, as Progress does, once it has been silent for longer
+/// than a person waits.
+class Waiting {
+ public:
+  explicit Waiting(std::string what, std::chrono::milliseconds silence = std::chrono::seconds(2));
+
+ private:
+  std::jthread teller_;
+};
+
 }  // namespace palpate

@@ -2,8 +2,11 @@
 #include "precompute/time_left.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <string>
 #include <vector>
 
 #include "precompute/progress.h"
@@ -112,6 +115,23 @@ TEST(TimeLeft, PassesOverWhatWasKeptFromAnEarlierRun) {
   time_left.begin("something else", 7.0);
   time_left.reach(1.0, 11.0);
   EXPECT_DOUBLE_EQ(time_left.seconds(11.0), 4.0);
+}
+
+TEST(Waiting, IsToldOnceItIsLong) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const int error = ::dup(STDERR_FILENO);
+  ::dup2(ends[1], STDERR_FILENO);
+  std::string said(200, '\0');
+  { const Waiting at_once("nothing", std::chrono::hours(1)); }
+  {
+    const Waiting waiting("reading organ.stl", std::chrono::milliseconds(1));
+    said.resize(static_cast<std::size_t>(::read(ends[0], said.data(), said.size())));
+  }
+  ::dup2(error, STDERR_FILENO);
+  for (const int end : {ends[0], ends[1], error}) ::close(end);
+  EXPECT_NE(said.find("reading organ.stl"), std::string::npos) << said;
+  EXPECT_EQ(said.find("nothing"), std::string::npos) << said;
 }
 
 TEST(TimeLeft, IsWrittenInNoMoreDigitsThanAnEstimateHas) {

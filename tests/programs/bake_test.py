@@ -289,6 +289,24 @@ lowest = { axis = "x", percent = 0.1 }
         self.assertRegex(result.stderr, r"[1-9]\d* of \d+ columns were kept")
         self.assertEqual(old.read_bytes(), straight.read_bytes())
 
+    def test_a_second_run_is_refused_at_the_start_and_an_early_end_leaves_nothing(self):
+        model = self.write("model.toml", cube_toml(16))
+        output = self.folder / "x.palpate.hdf"
+        journal = self.folder / "x.palpate.hdf.progress"
+        for end in (signal.SIGINT, signal.SIGTERM):
+            with subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL) as first:
+                self.wait_for(journal.exists, first)
+                first.send_signal(signal.SIGSTOP)
+                self.assertEqual(journal.read_bytes(), b"", "before the columns")
+                if end == signal.SIGINT:
+                    second = run(PRECOMPUTE, model, "-o", output)
+                    self.assert_refused(second, "another palpate-precompute is writing this file")
+                    self.assertNotIn("mesh", second.stderr)
+                first.send_signal(end)
+                first.send_signal(signal.SIGCONT)
+                self.assertEqual(first.wait(), 130)
+            self.assertEqual([path.name for path in self.folder.iterdir()], ["model.toml"])
+
     def test_interrupt_says_how_to_go_on_and_discard_begins_anew(self):
         model = self.write("model.toml", cube_toml(14))
         output = self.folder / "x.palpate.hdf"
