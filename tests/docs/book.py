@@ -82,6 +82,14 @@ def stale_features(root, has):
             yield f"{page}: {first}: {word} is {'not told' if word in has[name] else 'in no program'}"
 
 
+def missing_names(root):
+    """What palpate.h has and docs/reference/api.md, which lists all of it, has not."""
+    header, page = (root / "runtime/library/palpate.h").read_text(), (root / "docs/reference/api.md").read_text()
+    names = re.findall(r"\b(palpate_\w+)\(|^\} (palpate_\w+);|^#define (PALPATE_\w+_INIT)", header, re.MULTILINE)
+    told = set(re.findall(r":: (\w+)$", page, re.MULTILINE))
+    yield from sorted({name for found in names for name in found if name} - told)
+
+
 def long_pages(root):
     for page in pages(root):
         if page.name == "CHANGELOG.md":

@@ -78,6 +78,9 @@ class Features(unittest.TestCase):
     def test_lists_are_those_of_the_programs(self):
         self.assertEqual(list(book.stale_features(book.SOURCE, features())), [])
 
+    def test_the_reference_of_the_c_interface_has_all_of_the_header(self):
+        self.assertEqual(list(book.missing_names(book.SOURCE)), [])
+
     def test_what_is_new_or_gone_is_noticed(self):
         has = features()
         self.assertIn("newmark", has["--integrator"])
