@@ -38,7 +38,7 @@ set(palpate_dear
   programs_device_test.Felt                      test_the_hand_rests_where_its_spring_and_the_body_balance,test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit
   # Bodies that are baked or pressed for long.
   programs_bake_test.Models                      test_the_nodule_is_made_of_two_materials
-  programs_bake_test.Stopped                     test_interrupt_keeps_what_is_done_and_the_old_file_whole,test_compression_falls_back_and_a_killed_run_of_it_is_resumed
+  programs_bake_test.Stopped                     test_interrupt_keeps_what_is_done_and_the_old_file_whole,test_a_second_run_is_refused_at_the_start_and_an_early_end_leaves_nothing,test_compression_falls_back_and_a_killed_run_of_it_is_resumed
   programs_live_test.Live                        test_equal_runs_are_equal_and_replay_to_the_bit
   programs_hertz_test.Hertz                      test_a_shallow_press_is_not_held_out_by_edges
   programs_limits_test.Starved                   test_runtime_in_little_address_space,test_stacks_of_openmp
