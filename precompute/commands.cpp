@@ -21,6 +21,7 @@
 #include "precompute/draft_command.h"
 #include "precompute/inspect.h"
 #include "precompute/machine/blas_room.h"
+#include "precompute/progress.h"
 #include "precompute/verify.h"
 
 namespace palpate {
@@ -136,8 +137,10 @@ int run_bake(const std::string& model, const BakeOptions& options, bool unless_d
 }
 
 int run_verify(const std::string& file) {
+  std::optional<Waiting> waiting(std::in_place, "verifying " + file);
   const Model model = load_model(file);
   const VerifyReport report = verify(model, file);
+  waiting.reset();
   say_lines(stdout, to_text(report));
   if (!report.passed()) return exit_differs;
   say(stderr, "next: {}\n", to_touch(file, model.scope != Scope::none));
@@ -145,7 +148,9 @@ int run_verify(const std::string& file) {
 }
 
 int run_compare(const std::string& a, const std::string& b, const CompareOptions& options) {
+  std::optional<Waiting> waiting(std::in_place, "comparing " + a + " with " + b);
   const Comparison comparison = compare(load_model(a), load_model(b), options);
+  waiting.reset();
   say_lines(stdout, to_text(comparison));
   return exit_ok;
 }
