@@ -89,7 +89,12 @@ int play(PlayOptions options) {
   std::optional<SessionView> beside;  // first: a broken file is told even where the port is taken
   if (!options.beside.empty()) beside.emplace(options.beside);
   std::optional<ViewerPort> port;
-  if (options.view) port.emplace(*options.view);
+  if (options.view) {
+    ViewerOptions view = *options.view;
+    view.shows = {options.file};
+    if (beside) view.shows.push_back(options.beside);
+    port.emplace(view);
+  }
   std::optional<ListeningSocket> igtl_socket;
   if (options.igtl) igtl_socket.emplace(*options.igtl, "--igtl");
   InputSource input = make_input_source(options, guardian ? &*guardian : nullptr);

@@ -15,7 +15,7 @@
 
 namespace palpate {
 
-int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptions& options) {
+int view(const std::vector<std::filesystem::path>& recordings, ViewerOptions options) {
   sigset_t ends;  // blocked before the server's thread begins, which inherits that
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
@@ -24,6 +24,7 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   std::vector<RunToShow> runs;
   for (const std::filesystem::path& recording : recordings)
     runs.push_back({sessions.emplace_back(recording), true});
+  options.shows = recordings;
   ViewerPort port(options);
   const ServedAddress served = port.served();
   ViewerServer server(std::move(port), runs);

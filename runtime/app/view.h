@@ -9,6 +9,6 @@
 namespace palpate {
 
 /// Serves a recording, or two side by side, until SIGINT or SIGTERM. Returns the exit code; throws Error.
-int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptions& options);
+int view(const std::vector<std::filesystem::path>& recordings, ViewerOptions options);
 
 }  // namespace palpate

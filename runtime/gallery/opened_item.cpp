@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/program.h"
+#include "runtime/serving/admission.h"
 
 namespace palpate {
 namespace {
@@ -25,7 +26,6 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kept_lines = 12;
 constexpr std::size_t longest_line = 1 << 16;  // [bytes]
 constexpr int last_reads = 64;                 // of what a program that has ended printed
-constexpr std::size_t token_digits = 32;
 
 /// One of the next ports, so that pages find again what they keep by their address; else any that is free.
 std::uint16_t port_beside(ViewerOptions options) {
@@ -39,12 +39,6 @@ std::uint16_t port_beside(ViewerOptions options) {
     }
   }
   return 0;
-}
-
-bool is_token(const std::string& text) {
-  return text.size() == token_digits && std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-         });
 }
 
 bool is_readable(int descriptor) {

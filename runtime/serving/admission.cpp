@@ -2,13 +2,17 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <optional>
 #include <system_error>
+#include <vector>
 
 #include "base/random_bytes.h"
+#include "runtime/devices/bridge/bridge_seal.h"
 
 namespace palpate {
 namespace {
@@ -23,11 +27,6 @@ bool is_ipv4(const std::string& text) {
 bool is_ipv6(const std::string& text) {
   in6_addr address{};
   return inet_pton(AF_INET6, text.c_str(), &address) == 1;
-}
-
-/// As a browser writes them.
-bool is_this_machine(const std::string& name) {
-  return name == "localhost" || name == "[::1]" || (name.starts_with("127") && is_ipv4(name));
 }
 
 /// Nothing for what is no port from 1 on, in digits.
@@ -47,6 +46,10 @@ std::string lower_case(std::string_view text) {
 }
 
 }  // namespace
+
+bool is_this_machine(const std::string& name) {
+  return name == "localhost" || name == "[::1]" || (name.starts_with("127") && is_ipv4(name));
+}
 
 bool is_any_address(const std::string& address) {
   return address == "0.0.0.0" || address == "::";
@@ -75,9 +78,20 @@ bool is_own_page(std::string_view origin, std::string_view host) {
 }
 
 std::string random_token() {
-  std::string token;
-  for (const std::uint8_t byte : random_bytes<16>()) token += fmt::format("{:02x}", byte);
-  return token;
+  return fmt::format("{:02x}", fmt::join(random_bytes<16>(), ""));
+}
+
+bool is_token(std::string_view text) noexcept {
+  constexpr std::size_t digits = 32;
+  return text.size() == digits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+std::string proof_of(const std::string& token, std::string_view nonce) {
+  const std::string both = token + std::string(nonce);
+  const std::vector<std::uint8_t> bytes(both.begin(), both.end());
+  std::array<std::uint8_t, BRIDGE_HASH_BYTES> hash{};
+  bridge_hash(bytes.data(), bytes.size(), hash.data());
+  return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
 bool is_same_token(std::string_view given, std::string_view token) noexcept {
@@ -91,14 +105,15 @@ bool is_same_token(std::string_view given, std::string_view token) noexcept {
 
 Target split_target(std::string_view target) {
   const std::size_t question = target.find('?');
-  Target result{target.substr(0, question), {}};
+  Target result{target.substr(0, question), {}, {}};
   if (question == std::string_view::npos) return result;
   std::string_view rest = target.substr(question + 1);
-  constexpr std::string_view token = "token=";
+  constexpr std::string_view token = "token=", nonce = "nonce=";
   while (!rest.empty()) {
     const std::size_t end = rest.find('&');
     const std::string_view part = rest.substr(0, end);
     if (part.starts_with(token)) result.token = part.substr(token.size());
+    if (part.starts_with(nonce)) result.nonce = part.substr(nonce.size());
     rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
   }
   return result;

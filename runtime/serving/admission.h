@@ -8,6 +8,8 @@
 namespace palpate {
 
 bool is_any_address(const std::string& address);  ///< 0.0.0.0 or ::
+/// Whether a host, as a browser writes it, is localhost, 127.x.x.x or [::1].
+bool is_this_machine(const std::string& host);
 /// As in a URL: IPv6 in brackets.
 std::string url_host(const std::string& address);
 
@@ -21,13 +23,18 @@ bool is_own_page(std::string_view origin, std::string_view host);
 
 /// 128 random bits as hexadecimal digits.
 std::string random_token();
+/// Whether it may be one: 32 of such digits.
+bool is_token(std::string_view text) noexcept;
+/// What only who has the token can answer to `nonce`: SHA-256 of both, as hexadecimal digits.
+std::string proof_of(const std::string& token, std::string_view nonce);
 /// Takes as long wherever they differ.
 bool is_same_token(std::string_view given, std::string_view token) noexcept;
 
-/// What stands before the `?` of a request's target, and the value of `token` behind it, empty without.
+/// What stands before the `?` of a request's target, and the values of `token` and `nonce` behind it, empty
+/// without.
 struct Target {
   std::string_view path;
-  std::string_view token;
+  std::string_view token, nonce;
 };
 Target split_target(std::string_view target);
 

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <system_error>
 
+#include "base/error.h"
 #include "base/file_io.h"
 #include "base/program.h"
+#include "runtime/devices/bridge/secret_file.h"
 #include "runtime/serving/admission.h"
 
 namespace palpate {
@@ -16,13 +19,36 @@ std::string seen_from_here(const std::string& address) {
   return address == "::" ? "[::1]" : "127.0.0.1";
 }
 
+/// The last run's at this port, if it showed the same to this user; else a new one, which is kept. Who has
+/// the port has the file.
+std::string token_of(const ViewerOptions& options) {
+  if (options.shows.empty() || options.port == 0 || options.told >= 0 ||
+      !is_this_machine(url_host(options.address)))
+    return random_token();
+  std::string shows;
+  for (const std::filesystem::path& file : options.shows) {
+    std::error_code nothing_there;  // which is told later
+    shows += std::filesystem::weakly_canonical(file, nothing_there).string() + "\n";
+  }
+  std::string token = random_token();
+  try {
+    const std::filesystem::path file = secret_file(fmt::format("viewer-{}.token", options.port));
+    const std::string kept = read_secret(file);
+    const std::string before = kept.substr(0, token.size());
+    if (is_token(before) && kept == before + "\n" + shows) return before;
+    write_secret(file, token + "\n" + shows);
+  } catch (const Error&) {  // there is no folder for it: the next run has another one
+  }
+  return token;
+}
+
 }  // namespace
 
 ViewerPort::ViewerPort(const ViewerOptions& options)
     : socket_({.address = options.address, .port = options.port}, "viewer"),
       served_{.address = options.address,
               .port = socket_.address().port,
-              .token = random_token(),
+              .token = token_of(options),
               .book = options.book,
               .runs = 1,
               .framed = options.framed,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "runtime/serving/book_files.h"
 #include "runtime/serving/listening_socket.h"
@@ -27,6 +28,9 @@ struct ViewerOptions {
   std::filesystem::path book = find_book();  ///< folder of the book's site; empty: none is served
   bool framed = false;  ///< pages of this machine's other servers, as notebooks, may have it in a frame
   int told = -1;        ///< descriptor of the program that is told the address; -1: a person is
+  /// What is shown to a person. The next run that shows it at this port of this machine has the same token,
+  /// so that pages find it; where nothing is named, none has.
+  std::vector<std::filesystem::path> shows = {};
 };
 
 /// Where it is served, the secret that each request must show, and the book beside it.
@@ -44,7 +48,8 @@ struct ServedAddress {
 /// ViewerServer serves the port, and is turned away when the port is destroyed instead.
 class ViewerPort {
  public:
-  /// Takes the address and draws the token. Throws Error (port in use, address unknown).
+  /// Takes the address and draws the token, or has that of the run before. Throws Error (port in use, address
+  /// unknown).
   explicit ViewerPort(const ViewerOptions& options);
 
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }

@@ -31,6 +31,10 @@ std::string_view path_in_run(const Request& request, const ServedAddress& served
   return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);
 }
 
+bool wants_page(const Request& request, const ServedAddress& served) {
+  return path_in_run(request, served) == "/" || (served.runs > 1 && target_of(request).path == both_runs);
+}
+
 Response surface_file(bool is_stl, const DrawnPicture& shown) {
   try {
     Response response;
@@ -48,6 +52,16 @@ Response surface_file(bool is_stl, const DrawnPicture& shown) {
 
 }  // namespace
 
+bool wants_proof(const Request& request) {
+  return target_of(request).path == "/proof";
+}
+
+Response proof_answer(const Request& request, const ServedAddress& served) {
+  const std::string_view nonce = target_of(request).nonce;
+  if (!is_token(nonce)) return guarded(plain(http::status::bad_request, "A nonce is 32 hexadecimal digits."));
+  return guarded(plain(http::status::ok, proof_of(served.token, nonce)));
+}
+
 bool wants_book(const Request& request) {
   return target_of(request).path.starts_with(book_path);
 }
@@ -64,8 +78,14 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
   if (std::optional<Response> refused = foreign_refusal(request, served)) return refused;
   if (request.method() != http::verb::get && request.method() != http::verb::head)
     return method_refusal("GET, HEAD");
-  if (!wants_book(request))
-    if (std::optional<Response> refused = token_refusal(request, served)) return refused;
+  if (!wants_book(request) && !wants_proof(request)) {
+    if (std::optional<Response> refused = token_refusal(request, served)) {
+      if (!wants_page(request, served)) return refused;
+      Response page = answer(request, served, {});  // which says what to do: it is the same for everybody
+      page.result(http::status::forbidden);
+      return page;
+    }
+  }
   if (wants_socket(request, served)) {
     const auto offered = request.find(http::field::sec_websocket_protocol);
     if (offered != request.end() && !http::token_list(offered->value()).exists(subprotocol))

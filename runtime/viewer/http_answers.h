@@ -27,6 +27,12 @@ std::size_t run_of(const Request& request, const ServedAddress& served);
 /// Whether it wants to go on as a WebSocket.
 bool wants_socket(const Request& request, const ServedAddress& served);
 
+/// Whether it asks for a proof that the server has the token, before it shows its own.
+bool wants_proof(const Request& request);
+
+/// The proof.
+Response proof_answer(const Request& request, const ServedAddress& served);
+
 /// Whether it asks for the book, which is the same for everybody and needs no token.
 bool wants_book(const Request& request);
 

@@ -52,6 +52,7 @@ void PageConnection::answer_request() {
   }
   if (wants_book(request)) return respond(book_answer(request, server_.served().book));
   if (!server_.has_room()) return respond(full_house());
+  if (wants_proof(request)) return respond(proof_answer(request, server_.served()));
   is_admitted_ = true;
   run_ = &server_.run(run_of(request, server_.served()));
   if (wants_socket(request, server_.served())) {

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { createServer, request } from 'node:http';
 import { existsSync } from 'node:fs';
-import { readFile } from 'node:fs/promises';
+import { copyFile, readFile } from 'node:fs/promises';
 import { after, test } from 'node:test';
 import { close, example, open, project, ready, serve, source, told, until, visit } from './harness.mjs';
 import { open_cube, part, serve_cube, settled, top } from './steps.mjs';
@@ -55,13 +55,34 @@ test('the page comes back by itself when its connection is lost, and after a rel
   assert.ok((await readFile(await download.path())).length > 84);
 });
 
-test('a program that was started anew has another address, which the page says', async (t) => {
-  const { page, served, file, at } = await open_cube(t);
+test('a page finds the next run of the same body, and says where another one is shown or another program has the port', async (t) => {
+  const first = await serve_cube(t);
+  await first.served.stop();
+  const start = (file) => serve(t, ['play', file, '--view', '--view-address', `127.0.0.1:${first.served.port}`], first.at, { env: { ...process.env, XDG_RUNTIME_DIR: first.at } });
+  let served = await start(first.file);
+  const page = await ready(await visit(t, served.url));
+  const connected = (is_so) => until(page, (wanted) => (document.querySelector('[data-testid="connection"]').dataset.state === 'live') === wanted, is_so);
   await served.stop();
-  await until(page, () => document.querySelector('[data-testid="connection"]').dataset.state === 'lost');
-  const again = await serve(t, ['play', file, '--view', '--view-address', `127.0.0.1:${served.port}`], at);
-  await page.getByText('the program was started anew: open the address that it printed').waitFor();
-  await page.goto(again.url);
+  await connected(false);
+  await page.getByText('Start it again as before').waitFor();
+  const asked = [];
+  const stranger = createServer((request, response) => (asked.push(request.url), response.end('{}'))).listen(served.port, '127.0.0.1');
+  await page.getByText('Open the whole address that palpate-runtime printed').waitFor();
+  stranger.closeAllConnections();
+  await new Promise((resolve) => stranger.close(resolve));
+  assert.ok(asked.length > 0 && asked.every((url) => /^\/proof\?nonce=\w{32}$/.test(url)), `a stranger was asked ${asked}`);
+  served = await start(first.file);
+  await connected(true);
+  await until(page, () => window.palpate.state.you === 'controller');
+  await served.stop();
+  const copy = `${first.at}/other.palpate.hdf`;
+  await copyFile(first.file, copy);
+  served = await start(copy);
+  await page.getByText('This address shows something else now').waitFor();
+  await page.reload();
+  await page.getByText('This address shows nothing now').waitFor();
+  await page.getByText('Open the whole address that palpate-runtime printed').waitFor();
+  await page.goto(served.url);
   await ready(page);
 });
 

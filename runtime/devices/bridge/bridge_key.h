@@ -11,13 +11,10 @@ namespace palpate {
 /// 128 random bits, drawn anew for each run.
 using BridgeKey = std::array<std::uint8_t, 16>;
 
-/// Where a bridge finds the key of a port: palpate/bridge-PORT.key in $XDG_RUNTIME_DIR, without that in
-/// $XDG_STATE_HOME, without that in ~/.local/state. Throws Error where none of them is set.
+/// Where a bridge finds the key of a port: the secret bridge-PORT.key.
 [[nodiscard]] std::filesystem::path bridge_key_file(std::uint16_t port);
 
-/// Writes the key as 32 hexadecimal digits and a line's end, for this user's eyes alone (mode 0600), in the
-/// place of what was there; makes the folder (0700). Throws Error where that fails, or where others may write
-/// in the folder.
+/// Writes the key as 32 hexadecimal digits and a line's end, as a secret of this user.
 void write_bridge_key(const std::filesystem::path& file, const BridgeKey& key);
 
 /// Makes the last 8 bytes of a datagram the seal of those before.

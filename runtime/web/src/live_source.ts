@@ -11,7 +11,6 @@ const longest_drawing = 250; // [ms] that more is not asked for: a page out of s
 export class LiveSource implements Source {
   private readonly socket_ = new RunSocket();
   private wait_ = first_wait;
-  private is_open_ = false;
   private ask_timer_ = 0;
 
   constructor(
@@ -19,7 +18,7 @@ export class LiveSource implements Source {
     private readonly listener_: Listener,
   ) {
     this.socket_.onmessage = ({ data }: MessageEvent<News[]>) => this.take(data);
-    this.ask({ about: 'socket', url: url_ });
+    void this.connect();
     this.more();
   }
 
@@ -55,29 +54,45 @@ export class LiveSource implements Source {
   }
 
   private open(): void {
-    this.is_open_ = true;
     this.wait_ = first_wait;
     this.listener_.connected(true, '');
   }
 
   private close(reason: string): void {
-    this.is_open_ = false;
-    this.listener_.connected(false, `not connected${reason ? `: ${reason}` : ''}; trying again`);
-    void this.ask_why();
-    setTimeout(() => this.ask({ about: 'socket', url: this.url_ }), this.wait_ * 1000);
+    this.lose(`not connected${reason ? `: ${reason}` : ''}; trying again`);
+  }
+
+  private lose(note: string): void {
+    this.listener_.connected(false, note);
+    setTimeout(() => void this.connect(), this.wait_ * 1000);
     this.wait_ = Math.min(this.wait_ * 1.7, longest_wait);
   }
 
-  /** A socket that is refused does not say why, but the same address asked for as a page does. */
-  private async ask_why(): Promise<void> {
-    try {
-      const { status } = await fetch(this.url_.replace(/^ws/, 'http'), { cache: 'no-store' });
-      if (this.is_open_) return;
-      if (status === 403) this.listener_.connected(false, 'the program was started anew: open the address that it printed');
-      if (status === 503) this.listener_.connected(false, 'too many pages are open; trying again');
-    } catch {
-      // it is not there
-    }
+  private async connect(): Promise<void> {
+    const refused = await why_not(this.url_);
+    if (refused === '') this.ask({ about: 'socket', url: this.url_ });
+    else this.lose(refused);
+  }
+}
+
+const hex = (bytes: Uint8Array): string => [...bytes].map((byte) => byte.toString(16).padStart(2, '0')).join('');
+
+/**
+ * Why this address is not that of who answers there, empty where it is: the token is sent to nobody who does not prove to have it, as
+ * the port may have been another program's since the page was loaded. Where the browser lets no page hash, on a network that all can listen to,
+ * nothing is asked.
+ */
+async function why_not(url: string): Promise<string> {
+  if (!('subtle' in crypto)) return '';
+  const token = new URL(url).searchParams.get('token') ?? '';
+  const nonce = hex(crypto.getRandomValues(new Uint8Array(16)));
+  try {
+    const answer = await fetch(`/proof?nonce=${nonce}`, { cache: 'no-store' });
+    if (answer.status === 503) return 'too many pages are open; trying again';
+    const proof = hex(new Uint8Array(await crypto.subtle.digest('SHA-256', new TextEncoder().encode(token + nonce))));
+    return (await answer.text()).trim() === proof ? '' : 'open the whole address that palpate-runtime printed when it was started';
+  } catch {
+    return 'not connected; trying again';
   }
 }
 

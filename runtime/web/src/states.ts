@@ -11,9 +11,11 @@ export interface Told {
 /** What is said of a run; null: all is as usual. `lost` is why there is no connection, empty while there is one. */
 export function told_of(state: State | null, mode: Mode, lost: string): Told | null {
   if (lost !== '') {
-    if (!state?.model) return { kind: 'quiet', text: 'Connecting', hint: lost };
-    const again = lost.includes('anew') || lost.includes('too many') ? lost : 'Start it again, and open the address that it prints. What is seen is the last picture.';
-    return { kind: 'ended', text: 'The program has ended', hint: again };
+    const is_refused = lost.startsWith('open the') || lost.startsWith('too many');
+    const hint = `${lost.charAt(0).toUpperCase()}${lost.slice(1)}.`;
+    if (!state?.model) return is_refused ? { kind: 'ended', text: 'This address shows nothing now', hint } : { kind: 'quiet', text: 'Connecting', hint: lost };
+    const again = 'Start it again as before: this page finds it, or says what to open. What is seen is the last picture.';
+    return { kind: 'ended', text: is_refused ? 'This address shows something else now' : 'The program has ended', hint: is_refused ? `${hint} What is seen is the last picture.` : again };
   }
   if (!state?.model) return null;
   if (mode === 'file') return null;

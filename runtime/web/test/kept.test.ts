@@ -24,6 +24,7 @@ test('what the run is doing is told with what to do', () => {
   assert.equal(told_of({ ...run, paused: true }, 'live', '')?.kind, 'paused');
   assert.equal(told_of(run, 'live', 'not connected; trying again')?.text, 'The program has ended');
   assert.equal(told_of(null, 'live', 'not connected; trying again')?.text, 'Connecting');
+  for (const state of [null, run]) assert.match(told_of(state, 'live', 'open the whole address')!.hint, /^Open the whole address/);
   assert.match(told_of({ ...run, you: 'watcher' }, 'live', '')!.hint, /Another page/);
   assert.match(told_of({ ...run, you: 'watcher', controlled: false }, 'live', '')!.hint, /Take control/);
   assert.equal(told_of({ ...run, paused: true }, 'file', ''), null);

@@ -5,6 +5,8 @@
 #include <boost/asio/write.hpp>
 #include <chrono>
 #include <condition_variable>
+#include <cstdlib>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <random>
@@ -13,6 +15,7 @@
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
 #include "runtime/scene/node_order.h"
+#include "runtime/serving/admission.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/web/page.h"
 #include "tests/support/meshes_files.h"
@@ -231,6 +234,60 @@ TEST_F(Viewer, AsksForATokenWhereverItIs) {
     for (const std::string& query : {std::string(), wrong}) EXPECT_EQ(client({.query = query}).status, 403U);
     EXPECT_EQ(client().status, 101U);
   }
+}
+
+TEST_F(Viewer, GivesWhoHasNoTokenThePageWhichSaysWhatToDo) {
+  const test::Answer page = test::ask(served(), {.target = "/", .query = "?token=0"});
+  EXPECT_EQ(page.result_int(), 403U);
+  EXPECT_EQ(page.body(), viewer_page());
+  EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none'; script-src "));
+  EXPECT_LT(test::ask(served(), {.target = "/surface.stl", .query = ""}).body().size(), 200U);
+}
+
+TEST_F(Viewer, ProvesToWhoeverAsksFromHereThatItHasTheToken) {
+  const std::string nonce(32, '1');
+  EXPECT_EQ(proof_of(std::string(32, '0'), nonce),
+            "b11c187293f67c5a4fca84d509b3354537528291ae4d1f9315b9868b02f4305a");
+  const auto ask = [&](Asking asking) {
+    asking.target = "/proof";
+    return test::ask(served(), asking);
+  };
+  const std::string own = served().query.substr(std::string("?token=").size());
+  EXPECT_EQ(ask({.query = "?nonce=" + nonce}).body(), proof_of(own, nonce) + "\n");
+  for (const std::string& wrong : {std::string(), nonce + "1", std::string(32, 'x')})
+    EXPECT_EQ(ask({.query = "?nonce=" + wrong}).result_int(), 400U) << wrong;
+  EXPECT_EQ(ask({.query = "?nonce=" + nonce, .host = "evil.example"}).result_int(), 403U);
+  EXPECT_EQ(ask({.query = "?nonce=" + nonce, .origin = "http://evil.example"}).result_int(), 403U);
+}
+
+TEST_F(Viewer, HasTheTokenOfTheRunBeforeThatShowedTheSame) {
+  const test::ScratchFolder secrets;
+  const std::filesystem::path kept =
+      secrets.path() / "palpate" / ("viewer-" + std::to_string(port()) + ".token");
+  const ViewerOptions one = {.port = port(), .shows = {"one.palpate.hdf"}};
+  const auto token = [&](const ViewerOptions& options) {
+    server_.reset();
+    server_ = serve(options);
+    return served().query;
+  };
+  setenv("XDG_RUNTIME_DIR", secrets.path().c_str(), 1);
+  const std::string first = token(one);
+  EXPECT_EQ(token(one), first);
+  EXPECT_EQ(std::filesystem::status(kept).permissions(), std::filesystem::perms(0600));
+  std::filesystem::permissions(kept, std::filesystem::perms(0640));
+  const std::string second = token(one);
+  EXPECT_NE(second, first) << "others could have read it";
+  const ViewerOptions to_all = {.address = "0.0.0.0", .port = one.port, .shows = one.shows};
+  const ViewerOptions to_a_program = {.port = one.port, .told = 1, .shows = one.shows};
+  for (const ViewerOptions& other : {ViewerOptions{.port = one.port}, to_all, to_a_program})
+    EXPECT_NE(token(other), second);
+  EXPECT_EQ(token(one), second);
+  EXPECT_NE(token({.port = one.port, .shows = {"one.palpate.hdf", "two.mcap"}}), second);
+  EXPECT_NE(token(one), second) << "something else was shown since";
+  std::filesystem::permissions(kept.parent_path(), std::filesystem::perms::all);
+  std::filesystem::remove(kept);
+  EXPECT_NE(token(one), token(one)) << "it is kept where others may write";
+  unsetenv("XDG_RUNTIME_DIR");
 }
 
 TEST_F(Viewer, SaysHelloThenStateSceneAndPicture) {
