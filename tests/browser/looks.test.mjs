@@ -302,6 +302,8 @@ test('body and arrow keep off the legend, the colours and the cards, at five siz
         const what = `${width} × ${height}, ${field}`;
         const cards = await around(page, ['colour-card', 'materials', 'colour-gradient', 'hand']);
         assert.equal(cards.some(({ name }) => name === 'materials'), field === 'material', what);
+        const drawn_on = await page.locator('.stage > canvas').evaluate((canvas) => canvas.getBoundingClientRect().toJSON());
+        assert.deepEqual(lies_on({ ...drawn_on, right: drawn_on.right - 1 }, await around(page, ['colour-bar'])), [], `${what}: what is pulled or zoomed to there lies under the bar`);
         assert.deepEqual(lies_on((await told(page, 'seen')).body, cards), [], `${what}: the body lies on a card`);
         for (const at of [[-0.04, 0.048, 0.05], [0.02, -0.015, 0.05], [0.048, 0.048, 0.05]]) { // the farthest edge, which is the highest in the picture, and the corner beside the legend
           const { x, y } = await project(page, at);

@@ -48,6 +48,7 @@ export class ColourBar {
     this.scale = make_scale(field, low, high, largest, colouring);
     this.show_materials(field === 'material' ? moduli.map(material_name) : []);
     part('colour-bar').hidden = this.scale === null;
+    part('stage').classList.toggle('has-bar', this.scale !== null); // which has a column of its own: what is pulled or zoomed to there is cut off
     if (!this.scale) return;
     write(part('colour-largest'), where + this.scale.largest);
     part('colour-bar').classList.toggle('cut', this.scale.is_cut);

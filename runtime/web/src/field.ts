@@ -2,7 +2,7 @@
 import type { Field } from './colours';
 import type { Surface } from './pick';
 import type { Topology } from './topology';
-import { unknown_stress, type Frame } from './wire';
+import { floats_of_contact, unknown_stress, type Frame } from './wire';
 
 /** Displacements [3 N] in metres of the scene's nodes and the patch's; those of a patch that the frame does not have stay 0. */
 export function displacements(frame: Frame, topology: Topology, out: Float32Array): void {
@@ -14,6 +14,25 @@ export function displacements(frame: Frame, topology: Topology, out: Float32Arra
   for (let i = 0; i < patch / 3; ++i) {
     const node = topology.welded[i]!;
     if (node >= 0) for (let k = 0; k < 3; ++k) out[3 * node + k] = out[from + 3 * i + k]!;
+  }
+}
+
+/** The node that lies nearest to a place. */
+function nearest_node(place: ArrayLike<number>, { nodes, rest }: Topology, u: Float32Array): number {
+  let [best, found] = [Infinity, 0];
+  for (let i = 0; i < nodes; ++i) {
+    const away = Math.hypot(rest[3 * i]! + u[3 * i]! - place[0]!, rest[3 * i + 1]! + u[3 * i + 1]! - place[1]!, rest[3 * i + 2]! + u[3 * i + 2]! - place[2]!);
+    if (away < best) [best, found] = [away, i];
+  }
+  return found;
+}
+
+/** Where a tool holds the body the force is that of a point, and the stress there as large as the mesh is fine: it is not known, as where the body is fixed. */
+function forget_held(frame: Frame, topology: Topology, u: Float32Array, value: Float32Array, known: Float32Array): void {
+  for (let c = 0; c < frame.contact.length; c += floats_of_contact) {
+    if (!(frame.contact[c + floats_of_contact - 1]! > 0)) continue;
+    const node = nearest_node(frame.contact.subarray(c, c + 3), topology, u);
+    value[node] = known[node] = 0;
   }
 }
 
@@ -39,6 +58,7 @@ export function fill_field(field: Field, frame: Frame, topology: Topology, u: Fl
     for (let i = 0; i < topology.nodes; ++i) value[i] = Math.sqrt(u[3 * i]! ** 2 + u[3 * i + 1]! ** 2 + u[3 * i + 2]! ** 2);
   } else if (field === 'von-mises') {
     fill_stress(frame, topology, value, known);
+    forget_held(frame, topology, u, value, known);
   } else if (field === 'pressure') {
     for (let i = 0; i < frame.pressure_node.length; ++i) {
       const node = frame.pressure_node[i]!;

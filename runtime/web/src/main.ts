@@ -486,8 +486,8 @@ class Page implements Listener {
     const above = Math.max(0, ...shown(['colour-card']).map(({ bottom }) => bottom - stage.top));
     const below = Math.max(0, ...shown(['hand', 'replay', 'scale-bar']).map(({ top }) => stage.bottom - top)) || (is_small ? 3.4 : 4.2) * rem;
     const beside = Math.max(0, ...shown(['materials']).map(({ left }) => stage.right - left));
-    const bar = (stage.width < 480 ? 4.2 : 5.2) * rem; // room that is kept for the colours' bar, so that the body does not jump with it
-    return { top: above + 0.4 * rem, bottom: below + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: Math.max(bar, beside + 0.5 * rem) };
+    const bar = part('stage').classList.contains('has-bar') ? 0 : parseFloat(getComputedStyle(part('stage')).getPropertyValue('--bar')) * rem; // room that is kept for the colours' bar, so that the body does not jump with it
+    return { top: above + 0.4 * rem, bottom: below + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: Math.max(bar, beside) + 0.5 * rem };
   }
 
   /** Plays all of a recording once, and saves what is seen. */

@@ -42,7 +42,7 @@ export class Saving {
     try {
       const { canvas: view, shrink } = this.picture_.view.take_picture(Number(select('picture-size').value));
       const canvas = document.createElement('canvas');
-      compose_onto(canvas, view, shrink, this.picture_.view.element.clientWidth, this.caption(), inks_of(select('picture-ground').value as Ground));
+      compose_onto(canvas, view, shrink, this.picture_.view.extent.width, this.caption(), inks_of(select('picture-ground').value as Ground));
       save(await as_png(canvas), `${name}.png`);
     } catch (error) {
       toast('The picture could not be saved', String(error));
@@ -85,7 +85,7 @@ export class Saving {
   /** As it is seen; all pictures of a video have one size, that of the first. */
   private compose(): void {
     const { view } = this.picture_;
-    compose_onto(this.canvas_, view.canvas, 1, view.element.clientWidth, this.caption(), inks_of('seen'));
+    compose_onto(this.canvas_, view.canvas, 1, view.extent.width, this.caption(), inks_of('seen'));
   }
 
   private caption(): Caption {

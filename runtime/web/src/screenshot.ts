@@ -26,9 +26,13 @@ export interface Inks {
 
 type Context = CanvasRenderingContext2D;
 
+const scale_width = 140; // [px] of a bar with its title
+
 function draw_scale(context: Context, scale: Scale, inks: Inks, width: number, height: number): void {
   const [bar_height, x] = [Math.min(240, height - 150), width - 74];
   const y = (height - bar_height) / 2;
+  context.fillStyle = inks.dim;
+  context.fillRect(width - scale_width, 0, 0.5, height); // where the picture ends
   const gradient = context.createLinearGradient(0, y + bar_height, 0, y);
   scale.colours.forEach((colour, i) => gradient.addColorStop(i / (scale.colours.length - 1), colour));
   context.fillStyle = gradient;
@@ -108,7 +112,9 @@ function draw_marks(context: Context, { bar, arms }: Caption, inks: Inks, height
 /** Draws it all over a canvas, `shrink` times smaller than `view`, whose page is `page_width` wide. */
 export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement, shrink: number, page_width: number, caption: Caption, inks: Inks): void {
   const [view_width, view_height] = [Math.round(view.width / shrink), Math.round(view.height / shrink)];
-  if (canvas.width !== view_width || canvas.height !== view_height) Object.assign(canvas, { width: view_width, height: view_height });
+  const unit = view_width / Math.max(1, page_width);
+  const wide = view_width + (caption.scale ? Math.round(scale_width * unit) : 0); // the bar beside the picture
+  if (canvas.width !== wide || canvas.height !== view_height) Object.assign(canvas, { width: wide, height: view_height });
   const context = canvas.getContext('2d')!;
   context.resetTransform();
   context.clearRect(0, 0, canvas.width, canvas.height);
@@ -121,8 +127,7 @@ export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement,
     context.fillRect(0, 0, w, h);
   }
   context.imageSmoothingQuality = 'high';
-  context.drawImage(view, 0, 0, canvas.width, canvas.height);
-  const unit = canvas.width / Math.max(1, page_width);
+  context.drawImage(view, 0, 0, view_width, view_height);
   context.scale(unit, unit);
   const [width, height] = [canvas.width / unit, canvas.height / unit];
   context.shadowColor = inks.ground || '#ffffff'; // texts can be read over the body

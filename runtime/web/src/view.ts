@@ -49,10 +49,10 @@ export class View {
   body_box = new Box3();
   /** Around all that is drawn, but for the grid. */
   readonly seen_box = new Box3();
-  /** What the pointer touches: as large as the stage, of which the picture may show a part only. */
+  /** What the pointer touches: as large as the stage without the colours' bar; of it the picture may show a part only. */
   readonly pad = document.createElement('div');
 
-  /** Of the element [px]: asked of it in each picture, the browser would lay out the page each time. */
+  /** Of the pad [px]: asked of it in each picture, the browser would lay out the page each time. */
   extent = { width: 0, height: 0 };
 
   /** Every picture is drawn whole, as for a video. */
@@ -93,7 +93,7 @@ export class View {
     this.scene.add(this.still_);
     this.eye = new Eye(this.pad, () => this.margins());
     this.eye.changed = () => this.draw();
-    new ResizeObserver(() => this.resize()).observe(element);
+    new ResizeObserver(() => this.resize()).observe(this.pad);
     this.handed_over_.port1.onmessage = () => (this.done_at_ = performance.now());
     this.resize();
   }
@@ -130,7 +130,7 @@ export class View {
   }
 
   resize(): void {
-    const { clientWidth: width, clientHeight: height } = this.element;
+    const { clientWidth: width, clientHeight: height } = this.pad;
     this.extent = { width, height };
     if (width === 0 || height === 0) return;
     this.size_ = '';

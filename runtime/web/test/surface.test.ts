@@ -162,6 +162,19 @@ test('magnitudes', () => {
   assert.ok(Math.abs(value[1]! - 0.5 * Math.hypot(3, 4, 5)) < 1e-5);
 });
 
+test('where the tool holds a node its stress is not known: it is that of a point', () => {
+  const topology = make_topology(cube, null);
+  const stress = Uint16Array.from({ length: 8 }, (_, i) => (i === 7 ? 60001 : 1 + i));
+  const u = new Float32Array(24);
+  const largest = (held: number) => {
+    const frame = { stress, patch_stress: new Uint16Array(0), unit_stress: 2, contact: Float32Array.from([0.9, 1, 1.1, 0, 0, 1, 0, 0, -1, held]) } as unknown as Frame;
+    const [value, known] = [new Float32Array(topology.nodes), new Float32Array(topology.nodes)];
+    return [fill_field('von-mises', frame, topology, u, value, known), known[7], known[6]];
+  };
+  assert.deepEqual(largest(0), [120000, 1, 1]);
+  assert.deepEqual(largest(1), [12, 0, 1]);
+});
+
 test('a dent is how far nodes have gone with the force since the tool was away, near the tool', () => {
   const topology = make_topology(cube, null);
   const fell = Float32Array.from({ length: 24 }, (_, i) => (i % 3 === 2 ? -3 : 0)); // all of it, before the tool came
