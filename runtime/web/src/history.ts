@@ -37,9 +37,12 @@ export class History {
     return this.values_[column][(this.begin_ + i) % this.capacity_]!;
   }
 
-  /** A run that began anew forgets what was. */
+  /** Of a run that began anew what was is before its first tick; a recording that is another one forgets it. */
   add(ticks: Ticks): void {
-    if (ticks.first <= this.last) this.clear();
+    if (ticks.first <= this.last) {
+      if (this.grows_) this.clear();
+      else this.shift(ticks.first - 1 - this.last);
+    }
     if (this.grows_) this.reserve(this.count_ + ticks.count);
     const v = this.values_;
     for (let i = Math.max(0, ticks.count - this.capacity_); i < ticks.count; ++i) {
@@ -61,9 +64,13 @@ export class History {
     }
   }
 
-  clear(): void {
+  private clear(): void {
     this.begin_ = 0;
     this.count_ = 0;
+  }
+
+  private shift(ticks: number): void {
+    for (let i = 0; i < this.count_; ++i) this.tick_[(this.begin_ + i) % this.capacity_]! += ticks;
   }
 
   /** The first sample whose tick is not before `tick`. */

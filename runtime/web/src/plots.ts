@@ -96,9 +96,9 @@ class TimePlot {
     new ResizeObserver(() => this.plot_.setSize({ width: Math.max(50, element_.clientWidth), height })).observe(element_);
   }
 
-  /** The prefix of the axis' unit, as "kN". */
+  /** With its prefix, as "[kN]"; empty where nothing but 0 is drawn, which has no scale. */
   get unit(): string {
-    return `${this.prefix_[1]}${this.unit_}`;
+    return this.is_empty_ ? '' : `[${this.prefix_[1]}${this.unit_}]`;
   }
 
   draw(history: History, rate: number, window: Window): void {
@@ -267,9 +267,10 @@ export class Plots {
 
   draw(history: History, rate: number, shows_all: boolean): void {
     const last = Math.max(0, history.last) / rate;
-    let window: Window = { from: last - shown_seconds, to: last };
-    if (shows_all && history.count > 0) window = { from: history.tick(0) / rate, to: Math.max(last, 1e-3) };
-    if (last < shown_seconds && !shows_all) window = { from: 0, to: shown_seconds };
+    const first = history.count > 0 ? history.tick(0) / rate : 0; // below 0 where the run began anew
+    const from = Math.max(Math.min(0, first), last - shown_seconds);
+    let window: Window = { from, to: from + shown_seconds };
+    if (shows_all && history.count > 0) window = { from: first, to: Math.max(last, 1e-3) };
     if (this.zoom_) window = this.zoom_;
     this.force_.draw(history, rate, window);
     this.depth_.draw(history, rate, window);

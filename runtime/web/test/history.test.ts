@@ -25,7 +25,13 @@ test('the newest samples are kept', () => {
   assert.deepEqual([history.count, history.tick(0), history.last], [10, 35, 44]);
 });
 
-test('a run that began anew forgets; a replay keeps all', () => {
+test('a run that began anew goes on where the plots are, what was before 0; a replay keeps all, and forgets another one', () => {
+  const live = new History(10, false);
+  live.add(ticks(0, 7));
+  live.add(ticks(0, 2));
+  live.add(ticks(2, 1));
+  assert.deepEqual(Array.from({ length: live.count }, (_, i) => live.tick(i)), [-7, -6, -5, -4, -3, -2, -1, 0, 1, 2]);
+  assert.ok(Math.abs(live.value('depth', 6) - 0.006) < 1e-8 && live.value('depth', 7) === 0);
   const history = new History(10, true);
   for (let first = 0; first < 100; first += 25) history.add(ticks(first, 25));
   assert.deepEqual([history.count, history.tick(0), history.last], [100, 0, 99]);
