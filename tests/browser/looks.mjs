@@ -90,9 +90,9 @@ export const difference = (page, one, other, { x, y, from, to }) =>
 /// Texts that are cut off or covered, controls that are smaller than `target` pixels: sentences, none where all is well.
 export const faults_of_layout = (page, target) =>
   page.evaluate((least) => {
-    const style = document.createElement('style');
-    style.textContent = '*, *::before, *::after { pointer-events: auto !important; transition: none !important; } .over, .marks, .toasts, .colour-bar { pointer-events: none !important; }'; // which are nothing themselves
-    document.head.append(style);
+    const style = new CSSStyleSheet(); // as the page lets no other style in
+    style.replaceSync('*, *::before, *::after { pointer-events: auto !important; transition: none !important; } .over, .marks, .toasts, .colour-bar { pointer-events: none !important; }'); // which are nothing themselves
+    document.adoptedStyleSheets.push(style);
     const found = [];
     const shown = (element) => element.checkVisibility({ visibilityProperty: true, opacityProperty: true }) && element.getClientRects().length > 0;
     const scrolls = (element) => ['auto', 'scroll'].includes(getComputedStyle(element).overflowY);
@@ -147,7 +147,7 @@ export const faults_of_layout = (page, target) =>
       if (Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1) found.push(`${name} lies on ${other}`);
     }));
     if (document.documentElement.scrollWidth > innerWidth + 1) found.push('the page is wider than the window');
-    style.remove();
+    document.adoptedStyleSheets = document.adoptedStyleSheets.filter((one) => one !== style);
     return [...new Set(found)];
   }, target);
 

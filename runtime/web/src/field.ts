@@ -95,7 +95,7 @@ export function fill_dent(frame: Frame, topology: Topology, u: Float32Array, unt
   }
   for (let i = 0; i < topology.nodes; ++i) {
     const away = Math.hypot(...[0, 1, 2].map((k) => topology.rest[3 * i + k]! + u[3 * i + k]! - frame.tool[k]!));
-    value[i] = Math.max(0, value[i]! - mean) / (size * (1 + (away / (4 * size)) ** 4));
+    value[i] = Math.max(0, value[i]! - mean) / (size * (1 + (away / (3 * size)) ** 6));
   }
 }
 
