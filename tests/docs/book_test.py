@@ -173,9 +173,10 @@ class Planted(unittest.TestCase):
         (source / "alone.md").write_text("# Alone\n")
         result = subprocess.run(["sphinx-build", "-q", "-W", "--keep-going", source, site], text=True, capture_output=True, check=False)
         self.assertEqual(result.returncode, 1, result.stderr)
-        for wanted in (r"index\.md:3: WARNING: KaTeX parse error", r"target not found: missing\.md",
-                       r"theory\.md#nowhere", r"alone\.md: WARNING: document isn't included in any toctree"):
+        for wanted in (r"index\.md:3: WARNING: KaTeX parse error", r"target not found: '?missing\.md",
+                       r"(theory\.md#|'theory': ')nowhere", r"alone\.md: WARNING: document isn't included in any toctree"):
             self.assertRegex(result.stderr, wanted)
-        self.assertEqual(list(book.broken_site(site)), ["theory.html: loads https://example.org/x.js", "theory.html: gone.html is not there"])
+        in_theory = [found for found in book.broken_site(site) if found.startswith("theory.html")]  # newer MyST leave planted links in index.html
+        self.assertEqual(in_theory, ["theory.html: loads https://example.org/x.js", "theory.html: gone.html is not there"])
         (root / "docs").symlink_to(source)
         self.assertEqual(list(book.unlisted_pages(root, site)), ["docs/alone.md: not in the table of contents"])
