@@ -85,7 +85,7 @@ ${body_light}
 ${share_glsl}
 vec3 own_colour() {
 #if COLOURING == 0
-  return tissue * mix(vec3(0.02, 0.012, 0.01), vec3(1.0), exp(-18.0 * v_shown.x)); // darker where it is pressed in
+  return tissue * mix(vec3(0.02, 0.012, 0.01), vec3(1.0), exp(-15.0 * v_shown.x)); // darker where it is pressed in
 #elif COLOURING == 2
   return texture2D(materials, vec2((floor(v_shown.w + 0.5) + 0.5) / 256.0, 0.5)).rgb;
 #else

@@ -82,21 +82,21 @@ export function fill_field(field: Field, frame: Frame, topology: Topology, u: Fl
 
 /**
  * How deep each node is pressed in, of the tool's size, in `value`: along the force, from where it was when the tool was last
- * away, against the mean of all nodes, which move along; what is far from the tool bends and is no dent.
+ * away, against the mean of the nodes some three sizes away, which bend or move along with what is around the dent.
  */
 export function fill_dent(frame: Frame, topology: Topology, u: Float32Array, untouched: Float32Array, size: number, value: Float32Array): void {
   const force = Math.hypot(...frame.force);
   const way = frame.force.map((f) => f / force);
-  let mean = 0;
+  const away = (i: number) => Math.hypot(...[0, 1, 2].map((k) => topology.rest[3 * i + k]! + u[3 * i + k]! - frame.tool[k]!)) / size;
+  let [sum, whole] = [0, 0];
   for (let i = 0; i < topology.nodes; ++i) {
     value[i] = 0;
     for (let k = 0; k < 3; ++k) value[i]! += way[k]! * (u[3 * i + k]! - (untouched[3 * i + k] ?? 0));
-    mean += value[i]! / topology.nodes;
+    const weight = 1 / (1 + (away(i) - 3.7) ** 4);
+    sum += weight * value[i]!;
+    whole += weight;
   }
-  for (let i = 0; i < topology.nodes; ++i) {
-    const away = Math.hypot(...[0, 1, 2].map((k) => topology.rest[3 * i + k]! + u[3 * i + k]! - frame.tool[k]!));
-    value[i] = Math.max(0, value[i]! - mean) / (size * (1 + (away / (3 * size)) ** 6));
-  }
+  for (let i = 0; i < topology.nodes; ++i) value[i] = Math.max(0, value[i]! - sum / whole) / (size * (1 + (away(i) / 3) ** 6));
 }
 
 /**
