@@ -1,5 +1,6 @@
 """The book's rules, each as a function that yields a line for what breaks it."""
 
+import hashlib
 import html.parser
 import itertools
 import os
@@ -88,6 +89,16 @@ def missing_names(root):
     names = re.findall(r"\b(palpate_\w+)\(|^\} (palpate_\w+);|^#define (PALPATE_\w+_INIT)", header, re.MULTILINE)
     told = set(re.findall(r":: (\w+)$", page, re.MULTILINE))
     yield from sorted({name for found in names for name in found if name} - told)
+
+
+def old_pictures(root):
+    """Pictures of the page that are not of today's, as scripts/pictures stamps them."""
+    digest = hashlib.sha256()
+    files = [root / "scripts/pictures", root / "runtime/web/index.html", *(root / "runtime/web/src").iterdir()]
+    for name in sorted(file.relative_to(root).as_posix() for file in files):
+        digest.update(f"{name}\n".encode() + (root / name).read_bytes())
+    if (root / "docs/pictures/page.sha256").read_text().strip() != digest.hexdigest():
+        yield "docs/pictures: push.webp and viewer*.png are of another page than runtime/web's: scripts/pictures makes them anew"
 
 
 def long_pages(root):

@@ -1,5 +1,6 @@
 """The book: that the site is built without a warning, that every link leads somewhere, and that pages stay short. Each rule also broken."""
 
+import hashlib
 import os
 import pathlib
 import re
@@ -109,6 +110,18 @@ class Rules(unittest.TestCase):
         file = self.root / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
+
+    def test_pictures_are_of_todays_page(self):
+        self.assertEqual(list(book.old_pictures(book.SOURCE)), [])
+
+    def test_pictures_of_another_page(self):
+        for name, text in (("scripts/pictures", "take"), ("runtime/web/index.html", "<p>"), ("runtime/web/src/a.ts", "a"), ("docs/pictures/page.sha256", "0")):
+            self.write(name, text)
+        self.assertIn("docs/pictures: push.webp and viewer*.png are of another page than runtime/web's: scripts/pictures makes them anew",
+                      book.old_pictures(self.root))
+        digest = hashlib.sha256(b"runtime/web/index.html\n<p>runtime/web/src/a.ts\nascripts/pictures\ntake").hexdigest()
+        self.write("docs/pictures/page.sha256", f"{digest}\n")
+        self.assertEqual(list(book.old_pictures(self.root)), [])
 
     def test_link_to_no_page(self):
         self.write("docs/press.md", "[up](../nowhere.md)\n")
