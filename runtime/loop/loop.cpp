@@ -219,8 +219,9 @@ class Loop {
       report_.largest_force = force.stableNorm();
       report_.largest_force_time = time();
       report_.largest_force_depth = depth();
+      const bool grabs = std::ranges::any_of(state.contacts(), &ContactPoint::held);
       report_.largest_force_stiffening =
-          mesh_stiffening(parts_.body, tool().tool, report_.largest_force_depth);
+          grabs ? 1.0 : mesh_stiffening(parts_.body, tool().tool, report_.largest_force_depth);
     }
     note_largest((force - force_before).stableNorm(), time(), report_.largest_jump,
                  report_.largest_jump_time);
