@@ -23,7 +23,7 @@ struct ImageHeader {
   std::array<double, 3> origin{};
   double turned = 0.0;   ///< largest angle between an axis of the image and the nearest of space [degrees]
   double sheared = 0.0;  ///< largest angle by which two axes miss a right one [degrees]; 0: no `shear`
-  /// Of positions about the origin, for the body as it is in space; column-major.
+  /// Turns positions about the origin into those of the body in space; column-major.
   std::array<double, 9> shear = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
   double unit = 0.0;                   ///< that the file counts in [mm]; 0: it does not say
   double lowest = 0.0, highest = 0.0;  ///< of the values
