@@ -35,15 +35,16 @@ std::string too_large(const Tool& tool, double size) {
 
 std::string too_small(const Tool& tool, const Body& body) {
   const double edge = body.mean_surface_edge();
-  if (!(tool.radius > 0.0))
-    return fmt::format("the tool is a point: what it feels is a mesh with edges of {:.2g} m", edge);
-  const double slight = 0.1 * tool.radius;
-  const double stiffening = mesh_stiffening(body, tool, tool.radius);
+  const double radius = std::max(tool.radius, tool.disc_radius);
+  if (!(radius > 0.0))
+    return fmt::format("the tool has no radius: what it feels is a mesh with edges of {:.2g} m", edge);
+  const double slight = 0.1 * radius;
+  const double stiffening = mesh_stiffening(body, tool, radius);
   if (!(stiffening > noticed_stiffening)) return "";
   return fmt::format(
       "the tool is small for the mesh, whose edges are {:.2g} m: pressed in by {:.2g} m the body is about "
       "{:.1f} times too stiff, by {:.2g} m {:.1f} times",
-      edge, slight, mesh_stiffening(body, tool, slight), tool.radius, stiffening);
+      edge, slight, mesh_stiffening(body, tool, slight), radius, stiffening);
 }
 
 void tell_small_tool(const std::string& note) {

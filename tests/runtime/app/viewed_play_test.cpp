@@ -472,6 +472,17 @@ TEST(FittingTool, IsAsLargeAsTheSurfacesEdgesWithinBounds) {
   EXPECT_NEAR(radius(8), (2.0 + std::sqrt(2.0)) / 3.0 / 8.0, 0.005);
 }
 
+TEST(FittingTool, TellsOfOneThatIsSmallForTheMesh) {
+  const Body body(test::unit_model(ElementType::hex8, 8, Scope::surface, Precision::double_precision));
+  const auto told = [&](const Tool& tool) { return too_small(tool, body); };
+  EXPECT_NE(told({}).find("no radius"), std::string::npos);
+  // h = 0.142, C = 0.78: a = R where it is pressed in by R, and 0.32 R by a tenth of it.
+  const char* const factors = "by 0.01 m the body is about 3.6 times too stiff, by 0.1 m 1.5 times";
+  EXPECT_NE(told({.radius = 0.1}).find(factors), std::string::npos) << told({.radius = 0.1});
+  EXPECT_EQ(told({.radius = 0.2}), "");
+  EXPECT_NE(told({.disc_radius = 0.1}), "");
+}
+
 /// A block of some layers, all nodes stored but those deeper than `layers` cells below its surface.
 class OverlayRings : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Layers, OverlayRings, testing::Values(0, 1, 2));
