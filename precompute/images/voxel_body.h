@@ -31,10 +31,10 @@ struct VoxelGrid {
 struct VoxelBody : VoxelGrid {
   static constexpr Index no_label = std::numeric_limits<Index>::min();
 
-  double file_unit = 0.0;  ///< that the image's file counts in [mm]; 0: it does not say
-  Mat3 shear = Mat3::Identity();
-  Vec3 sheared_about = Vec3::Zero();
-  /// Where a point of the grid lies: elsewhere only in images whose axes are not at right angles.
+  double file_unit = 0.0;             ///< that the image's file counts in [mm]; 0: it does not say
+  Mat3 shear = Mat3::Identity();      ///< of an image whose axes are not at right angles: grid to space
+  Vec3 sheared_about = Vec3::Zero();  ///< the point of the grid that stays where it is
+  /// Place in space of a point x of the grid: x itself unless the image is sheared.
   [[nodiscard]] Vec3 in_space(const Vec3& x) const { return sheared_about + shear * (x - sheared_about); }
 
   std::vector<std::uint8_t> inside;  ///< [voxels] 1 where body

@@ -17,10 +17,13 @@ namespace palpate {
 /// is longer than the body's `size`, the diagonal of its bounds [m].
 [[nodiscard]] std::string too_large(const Tool& tool, double size);
 
-/// That a tool is small for the body's mesh, for a person; empty where it is not (mesh_stiffening.h, a press
-/// as deep as the tool's radius). A point is.
+/// Why a tool is too small for the body's mesh, for a person: by how much the mesh is too stiff where the
+/// tool is pressed in by a tenth of its radius, and by its radius (mesh_stiffening.h). Empty where the second
+/// is not noticed. A tool without a radius is always too small.
 [[nodiscard]] std::string too_small(const Tool& tool, const Body& body);
-void tell_small_tool(const std::string& note);  ///< with what helps, unless there is nothing to tell
+
+/// Prints what `too_small` gave, and what helps, on the error stream; nothing where it is empty.
+void tell_small_tool(const std::string& note);
 
 /// Where a person moves the tool (by a pointer or a device) and the settings name none: the ball that suits
 /// the body, told on the error stream. Scripts and replays without one have a point, so that what they do

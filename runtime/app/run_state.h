@@ -35,7 +35,7 @@ struct RunState {
   Fault fault = Fault::none;
   std::optional<SurfaceChange> change{};  ///< of the surface that was shown half a second ago, or less
   SettingsText settings;
-  std::string tool_note;  ///< what is to be known of the tool on this body; may be empty
+  std::string tool_note;  ///< of too_small (fitting_tool.h); empty where the tool is not
 };
 
 [[nodiscard]] nlohmann::json to_json(const RunState& state);
