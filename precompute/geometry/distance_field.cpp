@@ -142,6 +142,30 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
   return (1.0 - t[2]) * front + t[2] * back;
 }
 
+void DistanceField::grow_to(double voxels) {
+  constexpr int points = 8;
+  const double reach = grid_.spacing.norm();  // the field changes by at most 2 a unit of length
+  double inside = 0.0;
+  std::vector<float> near;  // values at points by the boundary
+  for (std::size_t v = 0; v < distance_.size(); ++v) {
+    if (static_cast<double>(distance_[v]) > reach) {
+      inside += points;
+    } else if (static_cast<double>(distance_[v]) > -3.0 * reach) {
+      for (unsigned p = 0; p < points; ++p) {
+        const Vec3 side((p & 1U) != 0 ? 0.25 : -0.25, (p & 2U) != 0 ? 0.25 : -0.25,
+                        (p & 4U) != 0 ? 0.25 : -0.25);
+        near.push_back(static_cast<float>((*this)(grid_.center(v) + side.cwiseProduct(grid_.spacing))));
+      }
+    }
+  }
+  const double wanted = std::clamp(points * voxels - inside, 0.0, static_cast<double>(near.size()));
+  const auto last = near.begin() + static_cast<std::ptrdiff_t>(wanted);
+  if (last == near.end()) return;
+  std::nth_element(near.begin(), last, near.end(), std::greater<>());
+  if (*last >= 0.0F) return;
+  for (float& distance : distance_) distance -= *last;
+}
+
 LabelField::LabelField(const VoxelBody& body) : body_(body, body.inside) {
   std::set<Index> labels;
   Index last = VoxelBody::no_label;

@@ -22,6 +22,10 @@ class DistanceField {
   /// At a point in the image's length unit; beyond the grid, the value at its rim.
   [[nodiscard]] double operator()(const Vec3& x) const noexcept;
 
+  /// Moves the boundary outward until the volume inside is that of so many voxels, sampled at eight points of
+  /// each; nothing where it is already.
+  void grow_to(double voxels);
+
  private:
   VoxelGrid grid_;
   std::vector<float> distance_;
@@ -37,6 +41,9 @@ class LabelField {
   };
 
   explicit LabelField(const VoxelBody& body);
+
+  /// Moves the boundary of the body outward until it holds the volume of so many voxels.
+  void grow_to(double voxels) { body_.grow_to(voxels); }
 
   [[nodiscard]] Place operator()(const Vec3& x) const noexcept;
   /// Whether a point is in the body.

@@ -301,6 +301,16 @@ TEST_F(ImageMesh, ThinPartsAndVolumeThatAreLostAreTold) {
   expect_mentions(notes_.back(), {"less volume than the image's body"});
 }
 
+TEST_F(ImageMesh, SmallBodiesKeepTheirVolume) {
+  TestImage image({19, 19, 19}, {1, 1, 1});
+  double voxels = 0.0;
+  for (int k = 0; k < 19; ++k)
+    for (int j = 0; j < 19; ++j)
+      for (int i = 0; i < 19; ++i)
+        if (Vec3(i - 9, j - 9, k - 9).norm() < 4.6) voxels += image(i, j, k) = 1;
+  EXPECT_NEAR(volume(mesh(image, edges(1.0))), voxels, 0.03 * voxels);  // smoothing alone takes 15 %
+}
+
 TEST_F(ImageMesh, BodyThatTouchesTheRim) {
   TestImage image({20, 20, 20}, {1, 1, 1});
   std::fill(image.labels.begin(), image.labels.end(), static_cast<unsigned char>(1));
