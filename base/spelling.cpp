@@ -4,8 +4,6 @@
 #include <numeric>
 #include <utility>
 
-#include "base/words.h"
-
 namespace palpate {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -22,6 +20,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     std::swap(last, row);
   }
   return last.back();
+}
+
+std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known) {
+  return *std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
+    return edit_distance(word, a) < edit_distance(word, b);
+  });
 }
 
 std::optional<std::string> meant(std::string_view word, const std::vector<std::string_view>& known) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/spelling.h"
 
 namespace palpate {
 namespace {

@@ -1,10 +1,7 @@
 #include "base/words.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
-
-#include "base/spelling.h"
 
 namespace palpate {
 
@@ -20,12 +17,6 @@ std::string shortened(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
   while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0U) == 0x80U) --most;  // inside a letter
   return std::string(text.substr(0, most)) + "...";
-}
-
-std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known) {
-  return *std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
-    return edit_distance(word, a) < edit_distance(word, b);
-  });
 }
 
 std::string shown(double value) {

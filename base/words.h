@@ -14,9 +14,6 @@ std::string comma_list(const std::vector<std::string_view>& words);
 /// At most `most` bytes of what a file says, for a message: "..." stands for the rest.
 std::string shortened(std::string_view text, std::size_t most = 60);
 
-/// The known word, of at least one, that takes the fewest changes of a letter (Levenshtein's distance).
-std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known);
-
 /// The shortest text that reads back as the same number, whatever the locale.
 std::string shown(double value);
 

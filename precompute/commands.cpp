@@ -18,6 +18,7 @@
 #include "precompute/bake_report.h"
 #include "precompute/compare.h"
 #include "precompute/description/not_a_description.h"
+#include "precompute/description/read_description.h"
 #include "precompute/draft_command.h"
 #include "precompute/inspect.h"
 #include "precompute/machine/blas_room.h"

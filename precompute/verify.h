@@ -6,16 +6,9 @@
 #include <vector>
 
 #include "formats/model.h"
+#include "precompute/verify_check.h"
 
 namespace palpate {
-
-/// One check: its largest relative error and the bound that it must keep.
-struct Check {
-  std::string name;
-  double error = 0.0;
-  double bound = 0.0;
-  [[nodiscard]] bool passed() const noexcept { return error <= bound; }  // false for NaN too
-};
 
 struct VerifyReport {
   std::vector<Check> checks;

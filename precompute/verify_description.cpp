@@ -9,6 +9,7 @@
 #include "matrices/hierarchical.h"
 #include "meshes/material_fields.h"
 #include "precompute/description/description.h"
+#include "precompute/description/read_description.h"
 #include "precompute/geometry/material_parts.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/fixed_nodes.h"

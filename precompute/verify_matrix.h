@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "precompute/numerics/precision.h"
-#include "precompute/verify.h"
+#include "precompute/verify_check.h"
 
 namespace palpate {
 

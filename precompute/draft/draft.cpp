@@ -14,6 +14,7 @@
 #include "base/toml_text.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
+#include "precompute/description/read_description.h"
 
 namespace palpate {
 namespace {

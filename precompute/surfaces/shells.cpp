@@ -12,7 +12,7 @@
 #include <optional>
 #include <utility>
 
-#include "precompute/surfaces/surface_mend.h"
+#include "precompute/surfaces/cgal_surface.h"
 
 namespace palpate {
 namespace {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "precompute/surfaces/surface_input.h"
+#include "precompute/surfaces/triangle_surface.h"
 
 namespace palpate {
 

@@ -1,8 +1,11 @@
 // Surfaces on their way from a child process.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "base/child_process.h"
-#include "precompute/surfaces/surface_input.h"
+#include "precompute/surfaces/triangle_surface.h"
 
 namespace palpate {
 

@@ -2,21 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "meshes/mesh.h"
+#include "precompute/surfaces/triangle_surface.h"
 
 namespace palpate {
-
-/// Closed, manifold surface of one body without self-intersections, oriented outwards, in the file's length
-/// unit: one shell, and others in it around cavities (shells.h).
-struct TriangleSurface {
-  std::vector<Vec3> nodes;
-  std::vector<Triangle> triangles;
-};
 
 /// Reads OFF, OBJ, STL (ASCII and binary) or PLY by the file's extension, splits polygons into triangles and
 /// turns triangles outwards. Repairs are told in `notes`. Throws Error with the coordinates when the surface
@@ -37,17 +28,5 @@ struct Remeshing {
 /// there would be too many triangles, and as read_surface does.
 Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurface& surface,
                          double edge_length);
-
-/// Area of the triangles.
-double area(const TriangleSurface& surface);
-
-/// Volume inside, positive where the triangles are turned outwards.
-double enclosed_volume(const TriangleSurface& surface);
-
-/// Mean length of the triangles' edges.
-double mean_edge_length(const TriangleSurface& surface);
-
-/// Distance of a point from the surface.
-std::function<double(const Vec3&)> distance_to(const TriangleSurface& surface);
 
 }  // namespace palpate

@@ -1,20 +1,11 @@
 // Single repairs of a closed surface, by CGAL; foreign code, for child processes.
 #pragma once
 
-#include <CGAL/Surface_mesh.h>
-
 #include <string>
 
-#include "precompute/surfaces/polygon_soup.h"
-#include "precompute/surfaces/surface_input.h"
+#include "precompute/surfaces/triangle_surface.h"
 
 namespace palpate {
-
-/// Nodes and triangles of a mesh without removed elements.
-TriangleSurface surface_of(const CGAL::Surface_mesh<PolygonSoup::Point>& mesh);
-
-/// A manifold surface as a mesh.
-CGAL::Surface_mesh<PolygonSoup::Point> mesh_of(const TriangleSurface& surface);
 
 /// What keeps a surface from being closed, manifold, around one body and free of self-intersections: the rest
 /// of "the surface ...". Empty where nothing does.

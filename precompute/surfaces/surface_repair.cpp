@@ -21,6 +21,7 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/regular_file.h"
+#include "precompute/surfaces/cgal_surface.h"
 #include "precompute/surfaces/polygon_soup.h"
 #include "precompute/surfaces/shells.h"
 #include "precompute/surfaces/surface_bytes.h"

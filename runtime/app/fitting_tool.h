@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "runtime/app/play.h"
+#include "runtime/app/play_options.h"
 #include "runtime/body/body.h"
 #include "runtime/touch/tool.h"
 

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "runtime/app/mouse_device.h"
-#include "runtime/app/play.h"
+#include "runtime/app/play_options.h"
 #include "runtime/body/body.h"
 #include "runtime/devices/hid/guardian.h"
 #include "runtime/loop/device_link.h"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "runtime/app/play.h"
+#include "runtime/app/play_options.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loop.h"
 #include "runtime/loop/played_parts.h"

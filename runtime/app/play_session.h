@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "runtime/app/input_source.h"
-#include "runtime/app/play.h"
+#include "runtime/app/play_options.h"
 #include "runtime/body/body.h"
 #include "runtime/loop/loop.h"
 #include "runtime/loop/played_parts.h"

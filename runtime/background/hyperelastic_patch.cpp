@@ -6,6 +6,7 @@
 
 #include "meshes/element.h"
 #include "runtime/body/overlay.h"
+#include "runtime/body/patch.h"
 #include "statics/live_forces.h"
 
 namespace palpate {

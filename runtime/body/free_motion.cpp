@@ -73,6 +73,13 @@ void set_zero(std::span<double> x) noexcept {
   std::fill(x.begin(), x.end(), 0.0);
 }
 
+/// Adds it to the displacement of the stored nodes [n].
+void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept {
+  const int d = body.dimension();
+  for (Index node = 0; node < body.greens().nodes(); ++node)
+    set_vector(u, d, node, vector_at(u, d, node) + displacement(body, shown, node));
+}
+
 }  // namespace
 
 double velocity_share(double kinetic_energy, double bound) noexcept {
@@ -88,10 +95,31 @@ Vec3 displacement(const Body& body, const MotionSnapshot& shown, Index stored) n
   return shown.q.empty() ? u : Vec3(u + body.modes()->displacement(stored, shown.q));
 }
 
-void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept {
-  const int d = body.dimension();
-  for (Index node = 0; node < body.greens().nodes(); ++node)
-    set_vector(u, d, node, vector_at(u, d, node) + displacement(body, shown, node));
+void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
+                          std::span<Vec3> u, const MotionSnapshot* motion) noexcept {
+  const bool moves = motion != nullptr && motion->moves;
+  const auto follow_body = [&](Index node, const auto& of_stored) {
+    const SurfaceParts parts = body.surface_parts(node);
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = 0; k < parts.stored.size(); ++k)
+      sum += parts.weights[k] * of_stored(parts.stored[k]);
+    return sum;
+  };
+  load.greens(body).displacement(load.nodes(), load.forces(), stored);
+  if (moves) add_motion(body, *motion, stored);
+  for (std::size_t node = 0; node < u.size(); ++node) {
+    u[node] =
+        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); });
+  }
+  if (load.patch == nullptr) return;
+  const std::span<const Index> nodes = load.patch->surface_nodes();
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    double values[3] = {};
+    patch_displacement(load, static_cast<Index>(k), {values, static_cast<std::size_t>(load.dimension)});
+    Vec3& at = u[nodes[k]];
+    at = Vec3(values[0], values[1], values[2]);
+    if (moves) at += follow_body(nodes[k], [&](Index j) { return displacement(body, *motion, j); });
+  }
 }
 
 FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)

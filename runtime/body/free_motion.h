@@ -59,8 +59,10 @@ struct MotionSnapshot {
 /// Displacement of a stored node [m].
 Vec3 displacement(const Body& body, const MotionSnapshot& shown, Index stored) noexcept;
 
-/// Adds it to the displacement of the stored nodes [n].
-void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept;
+/// Displacement [S x 3] of all surface nodes [m] by forces, on top of free motion where there is any.
+/// `stored` [n] is scratch: that of the stored nodes. For the eye: too long for a tick.
+void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
+                          std::span<Vec3> u, const MotionSnapshot* motion = nullptr) noexcept;
 
 /// The body's motion on its own: free vibration once it was let go and, with dynamic contact, what inertia
 /// and viscosity make of the forces so far (theory.md section 5). Contact forces of the tick displace the

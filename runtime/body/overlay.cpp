@@ -51,30 +51,6 @@ PatchStiffness assemble_patch(const Model& model, const PatchMesh& patch) {
           .K_LG = Eigen::MatrixXd(rows * shape_by_dofs(model, patch))};
 }
 
-Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes) {
-  const auto d = static_cast<Eigen::Index>(body.dimension());
-  const Eigen::Index order = d * static_cast<Eigen::Index>(nodes.size());
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> result(order, order);
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    body.greens().gather(
-        nodes[k], nodes,
-        {result.data() + d * static_cast<Eigen::Index>(k) * order, static_cast<std::size_t>(d * order)});
-  }
-  return result;
-}
-
-std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch) {
-  std::vector<Index> stored;
-  for (const Index node : patch.nodes) {
-    stored.push_back(body.stored_node(node));
-    if (stored.back() >= 0) continue;
-    throw Error(
-        "an overlay reaches node " + std::to_string(node) + ", whose Green's functions are not stored",
-        body.model().name, "precompute with scope = \"layers\" and as many layers as the overlay has rings");
-  }
-  return stored;
-}
-
 Overlay::Overlay(const Body& body, PatchMesh patch)
     : patch_(std::move(patch)), stored_(stored_nodes_of(body, patch_)) {
   const PatchStiffness stiffness = assemble_patch(body.model(), patch_);

@@ -60,11 +60,4 @@ class Overlay {
   Eigen::MatrixXd recover_;
 };
 
-/// [g] stored nodes of a patch's nodes. Throws Error when one is not stored: the file keeps too few layers
-/// below the surface.
-std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch);
-
-/// Xi at the blocks of some stored nodes [d m x d m].
-Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes);
-
 }  // namespace palpate

@@ -3,8 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <numeric>
+#include <string>
 
-#include "runtime/body/overlay.h"
+#include "base/error.h"
 
 namespace palpate {
 using Eigen::MatrixXd;
@@ -35,6 +36,30 @@ MatrixXd overlay_correction(const MatrixXd& G, const MatrixXd& greens) {
   const MatrixXd softened = MatrixXd::Identity(G.rows(), G.cols()) - G * greens;
   const MatrixXd M = softened.partialPivLu().solve(G);
   return 0.5 * (M + M.transpose());
+}
+
+MatrixXd greens_at(const Body& body, std::span<const Index> nodes) {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const Eigen::Index order = d * static_cast<Eigen::Index>(nodes.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> result(order, order);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    body.greens().gather(
+        nodes[k], nodes,
+        {result.data() + d * static_cast<Eigen::Index>(k) * order, static_cast<std::size_t>(d * order)});
+  }
+  return result;
+}
+
+std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch) {
+  std::vector<Index> stored;
+  for (const Index node : patch.nodes) {
+    stored.push_back(body.stored_node(node));
+    if (stored.back() >= 0) continue;
+    throw Error(
+        "an overlay reaches node " + std::to_string(node) + ", whose Green's functions are not stored",
+        body.model().name, "precompute with scope = \"layers\" and as many layers as the overlay has rings");
+  }
+  return stored;
 }
 
 Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed)

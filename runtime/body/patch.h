@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "overlay/condensation.h"
+#include "overlay/patch_mesh.h"
 #include "runtime/body/body.h"
 
 namespace palpate {
@@ -74,6 +75,13 @@ class Patch {
 /// The surface node (Body::simplices) that each of some local nodes on the surface is.
 std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
                                    const std::vector<Index>& local_nodes);
+
+/// [g] stored nodes of a patch's nodes. Throws Error when one is not stored: the file keeps too few layers
+/// below the surface.
+std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch);
+
+/// Xi at the blocks of some stored nodes [d m x d m].
+Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes);
 
 /// M = (I - G Xi_QQ)^-1 G, symmetric (theory.md section 4).
 Eigen::MatrixXd overlay_correction(const Eigen::MatrixXd& G, const Eigen::MatrixXd& greens);

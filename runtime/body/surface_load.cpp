@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "meshes/node_vectors.h"
-#include "runtime/body/free_motion.h"
+#include "runtime/body/body.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
@@ -59,33 +58,6 @@ void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> 
       for (int axis = 0; axis < d; ++axis) sum += by[axis] * f[axis];
     }
     u[k] = sum;
-  }
-}
-
-void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u, const MotionSnapshot* motion) noexcept {
-  const bool moves = motion != nullptr && motion->moves;
-  const auto follow_body = [&](Index node, const auto& of_stored) {
-    const SurfaceParts parts = body.surface_parts(node);
-    Vec3 sum = Vec3::Zero();
-    for (std::size_t k = 0; k < parts.stored.size(); ++k)
-      sum += parts.weights[k] * of_stored(parts.stored[k]);
-    return sum;
-  };
-  load.greens(body).displacement(load.nodes(), load.forces(), stored);
-  if (moves) add_motion(body, *motion, stored);
-  for (std::size_t node = 0; node < u.size(); ++node) {
-    u[node] =
-        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); });
-  }
-  if (load.patch == nullptr) return;
-  const std::span<const Index> nodes = load.patch->surface_nodes();
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    double values[3] = {};
-    patch_displacement(load, static_cast<Index>(k), {values, static_cast<std::size_t>(load.dimension)});
-    Vec3& at = u[nodes[k]];
-    at = Vec3(values[0], values[1], values[2]);
-    if (moves) at += follow_body(nodes[k], [&](Index j) { return displacement(body, *motion, j); });
   }
 }
 

@@ -49,11 +49,4 @@ struct SurfaceLoad {
 /// Displacement [m], d numbers each, of the patch's surface nodes from place `first` on, as many as fit.
 void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> u) noexcept;
 
-struct MotionSnapshot;
-
-/// Displacement [S x 3] of all surface nodes [m] by forces, on top of free motion where there is any.
-/// `stored` [n] is scratch: that of the stored nodes. For the eye: too long for a tick.
-void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u, const MotionSnapshot* motion = nullptr) noexcept;
-
 }  // namespace palpate

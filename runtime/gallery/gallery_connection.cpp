@@ -9,7 +9,6 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
-#include "runtime/gallery/gallery_server.h"
 
 namespace palpate {
 namespace {

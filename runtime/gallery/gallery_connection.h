@@ -5,6 +5,7 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -13,13 +14,23 @@
 
 namespace palpate {
 
-class GalleryServer;
+/// The server as its connections see it, on its thread.
+class GalleryHost {
+ public:
+  virtual ~GalleryHost() = default;
+
+  [[nodiscard]] virtual const ServedAddress& served() const noexcept = 0;
+  [[nodiscard]] virtual GalleryAnswers& answers() noexcept = 0;
+  [[nodiscard]] virtual Reception& reception() noexcept = 0;
+  /// Has another thread look, one file after the other, and answers on this one.
+  virtual void look_then(std::function<Response()> look, std::function<void(Response)> answer) = 0;
+};
 
 /// Reads it, has it answered, and is gone. For the server's thread.
 class GalleryConnection : public Received, public std::enable_shared_from_this<GalleryConnection> {
  public:
   /// `server` must live as long.
-  GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryServer& server)
+  GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryHost& server)
       : stream_(std::move(socket)), server_(server) {}
   ~GalleryConnection() override;  ///< a file that has not come whole is removed
   GalleryConnection(const GalleryConnection&) = delete;
@@ -38,7 +49,7 @@ class GalleryConnection : public Received, public std::enable_shared_from_this<G
   void respond(Response response);
 
   boost::beast::tcp_stream stream_;
-  GalleryServer& server_;
+  GalleryHost& server_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   std::optional<FileParser> file_;

@@ -4,8 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "runtime/gallery/gallery_connection.h"
-
 namespace palpate {
 
 namespace asio = boost::asio;

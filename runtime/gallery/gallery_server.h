@@ -9,28 +9,27 @@
 #include <thread>
 
 #include "runtime/gallery/gallery_answers.h"
+#include "runtime/gallery/gallery_connection.h"
 #include "runtime/serving/reception.h"
 #include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 
 /// HTTP in a thread of its own, which waits for nothing; files are looked at in another one.
-class GalleryServer {
+class GalleryServer : public GalleryHost {
  public:
   /// Serves `folder` at the port that `options` ask for. Throws Error (port in use, address unknown).
   GalleryServer(const std::filesystem::path& folder, const ViewerOptions& options);
-  ~GalleryServer();  ///< closes all connections, and ends what is shown
+  ~GalleryServer() override;  ///< closes all connections, and ends what is shown
   GalleryServer(const GalleryServer&) = delete;
   GalleryServer& operator=(const GalleryServer&) = delete;
 
-  [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
+  [[nodiscard]] const ServedAddress& served() const noexcept override { return served_; }
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
 
-  // What follows is for connections, on the thread.
-  [[nodiscard]] GalleryAnswers& answers() noexcept { return answers_; }
-  [[nodiscard]] Reception& reception() noexcept { return reception_; }
-  /// Has the other thread look, one file after the other, and answers on this one.
-  void look_then(std::function<Response()> look, std::function<void(Response)> answer);
+  [[nodiscard]] GalleryAnswers& answers() noexcept override { return answers_; }
+  [[nodiscard]] Reception& reception() noexcept override { return reception_; }
+  void look_then(std::function<Response()> look, std::function<void(Response)> answer) override;
 
  private:
   GalleryServer(ViewerPort port, const std::filesystem::path& folder, const ViewerOptions& options);

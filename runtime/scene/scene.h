@@ -9,16 +9,9 @@
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
 #include "runtime/body/patch.h"
+#include "runtime/scene/inner_surface.h"
 
 namespace palpate {
-
-/// Where materials meet within a body in space, at rest. Its nodes are not those of the surface.
-struct InnerSurface {
-  std::vector<Vec3> nodes;                      ///< [I] without loads [m]
-  std::vector<std::array<Index, 3>> triangles;  ///< [J] outward of `inside`
-  std::vector<std::uint8_t> inside;             ///< [J] number of the material on the one side
-  std::vector<std::uint8_t> outside;            ///< [J] and on the other
-};
 
 /// In space the surface as the elements have it; in the plane all elements, where their displacement is known
 /// (all free nodes are stored), else the boundary.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "matrices/error_bound.h"
@@ -11,8 +12,7 @@ namespace palpate {
 
 class Body;
 class NearField;
-struct Scratch;
-struct ToolState;
+struct ContactRow;
 
 /// Workspace of it.
 struct GreensErrorScratch {
@@ -24,10 +24,11 @@ struct GreensErrorScratch {
 };
 
 /// Takes the forces that a tick has found.
-void begin_greens_error(const NearField& near, Scratch& scratch) noexcept;
+void begin_greens_error(const NearField& near, GreensErrorScratch& work) noexcept;
 
-/// Takes in how the forces answer to a motion of the tool along an axis (scratch.force_change from `begin`
-/// on): adds to the square of tool.greens_error what the force may be off by along that axis.
-void note_greens_error(NearField& near, Scratch& scratch, ToolState& tool, Index begin) noexcept;
+/// The most that the force on a tool may be off by along an axis [N]: `force_change` [rows] is by how much
+/// the forces of `rows` answer to a motion of the tool along it [N/m].
+[[nodiscard]] double greens_error(NearField& near, GreensErrorScratch& work, std::span<const ContactRow> rows,
+                                  std::span<const double> force_change) noexcept;
 
 }  // namespace palpate

@@ -156,6 +156,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
 
   const int d = scratch.problem.dimension;
   const Index rows = scratch.problem.rows;
+  const auto count = static_cast<std::size_t>(rows);
   for (int axis = 0; axis < d; ++axis)
     fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero(), axis * rows);
   guess_force_changes(state, scratch, number);
@@ -174,7 +175,10 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     torque.col(axis) = change.torque;
     keep_closed_contacts(state, scratch, tool, axis * rows);
     note_answer(scratch, number, axis, axis * rows);
-    note_greens_error(state.surface.near, scratch, tool, axis * rows);
+    tool.greens_error =
+        std::hypot(tool.greens_error,
+                   greens_error(state.surface.near, scratch.greens_error, {scratch.rows.data(), count},
+                                {scratch.force_change.data() + axis * rows, count}));
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);
@@ -189,7 +193,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
 
 void linearise(const Body& body, State& state, Scratch& scratch) noexcept {
   begin_force_error(scratch);
-  begin_greens_error(state.surface.near, scratch);
+  begin_greens_error(state.surface.near, scratch.greens_error);
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k)
     linearise_tool(state, scratch, k, body.mean_surface_edge());
 }

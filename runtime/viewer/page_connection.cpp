@@ -4,7 +4,6 @@
 #include <boost/asio/buffer.hpp>
 #include <utility>
 
-#include "runtime/viewer/page_server.h"
 #include "runtime/viewer/page_word.h"
 #include "runtime/viewer/wire.h"
 

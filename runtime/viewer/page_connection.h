@@ -16,31 +16,39 @@
 #include "runtime/serving/reception.h"
 #include "runtime/viewer/broadcast.h"
 #include "runtime/viewer/http_answers.h"
+#include "runtime/viewer/shown_run.h"
 
 namespace palpate {
 
-class PageServer;
-class ShownRun;
+class PageConnection;
+
+/// The server as its connections see it, on its thread.
+class PageHost {
+ public:
+  virtual ~PageHost() = default;
+
+  [[nodiscard]] virtual const ServedAddress& served() const noexcept = 0;
+  [[nodiscard]] virtual ShownRun& run(std::size_t number) = 0;
+  /// Whether another connection that has shown the token may be answered.
+  [[nodiscard]] virtual bool has_room() const = 0;
+  /// It is gone, and its control with it.
+  virtual void leave(PageConnection& page) = 0;
+};
 
 /// One request, and where that asks for it a socket from then on: a page. For the server's thread.
-class PageConnection : public Received, public std::enable_shared_from_this<PageConnection> {
+class PageConnection : public Received, public Page, public std::enable_shared_from_this<PageConnection> {
  public:
   /// `server` must live as long.
-  PageConnection(boost::asio::ip::tcp::socket socket, PageServer& server)
+  PageConnection(boost::asio::ip::tcp::socket socket, PageHost& server)
       : stream_(std::move(socket)), server_(server), picture_timer_(stream_.get_executor()) {}
 
   void start() override;
   void cut() override;
-  /// Sends what there is that the page has not been sent, one message after the other.
-  void send_news();
-  /// A text that it must not miss.
-  void say(std::string text);
-  /// It sees this from now on, whatever is shown to all.
-  void look_alone(DrawnPicture picture, std::int64_t frame);
-  /// It sees what is shown to all.
-  void follow();
-  /// The frame that it sees alone.
-  [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept;
+  void send_news() override;
+  void say(std::string text) override;
+  void look_alone(DrawnPicture picture, std::int64_t frame) override;
+  void follow() override;
+  [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept override;
   /// The run that it asks for; null before it has shown the token.
   [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   [[nodiscard]] bool is_stalled() const override;
@@ -62,7 +70,7 @@ class PageConnection : public Received, public std::enable_shared_from_this<Page
 
   boost::beast::tcp_stream stream_;
   std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
-  PageServer& server_;
+  PageHost& server_;
   ShownRun* run_ = nullptr;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;

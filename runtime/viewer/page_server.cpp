@@ -7,8 +7,6 @@
 #include <chrono>
 #include <utility>
 
-#include "runtime/viewer/page_connection.h"
-
 namespace palpate {
 namespace {
 

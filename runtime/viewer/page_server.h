@@ -12,20 +12,20 @@
 #include <vector>
 
 #include "runtime/serving/reception.h"
+#include "runtime/serving/viewer_port.h"
 #include "runtime/viewer/http_answers.h"
+#include "runtime/viewer/page_connection.h"
 #include "runtime/viewer/shown_run.h"
-#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/viewed_run.h"
 
 namespace palpate {
 
-class PageConnection;
-
 /// Answers connections, and has each run take what is posted to its pages.
-class PageServer {
+class PageServer : public PageHost {
  public:
   /// As ViewerServer.
   PageServer(ViewerPort port, const std::vector<RunToShow>& runs);
-  ~PageServer();  ///< closes all connections
+  ~PageServer() override;  ///< closes all connections
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;
 
@@ -37,13 +37,10 @@ class PageServer {
     if (runs_[run]->post(std::forward<Put>(put))) boost::asio::post(context_, [this] { take_mail(); });
   }
 
-  // What follows is for connections, on the thread.
-  [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
-  [[nodiscard]] ShownRun& run(std::size_t number) { return *runs_[number]; }
-  /// Whether another connection that has shown the token may be answered.
-  [[nodiscard]] bool has_room() const { return reception_.has_room(); }
-  /// It is gone, and its control with it.
-  void leave(PageConnection& page);
+  [[nodiscard]] const ServedAddress& served() const noexcept override { return served_; }
+  [[nodiscard]] ShownRun& run(std::size_t number) override { return *runs_[number]; }
+  [[nodiscard]] bool has_room() const override { return reception_.has_room(); }
+  void leave(PageConnection& page) override;
 
  private:
   void tick();

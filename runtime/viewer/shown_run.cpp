@@ -4,7 +4,6 @@
 #include <variant>
 
 #include "base/error.h"
-#include "runtime/viewer/page_connection.h"
 
 namespace palpate {
 namespace {
@@ -47,15 +46,15 @@ void ShownRun::show_state_anew() {
 }
 
 void ShownRun::show_all() {
-  const std::set<PageConnection*> pages = open_;
-  for (PageConnection* page : pages) page->send_news();
+  const std::set<Page*> pages = open_;
+  for (Page* page : pages) page->send_news();
 }
 
-PageRole ShownRun::role(const PageConnection& page) const {
+PageRole ShownRun::role(const Page& page) const {
   return {controller_ == &page, controller_ != nullptr, open_.size(), page.own_frame()};
 }
 
-void ShownRun::join(PageConnection& page) {
+void ShownRun::join(Page& page) {
   open_.insert(&page);
   if (open_.size() == 1) controller_ = &page;
   broadcast_.touch_state();
@@ -63,7 +62,7 @@ void ShownRun::join(PageConnection& page) {
   show_all();
 }
 
-void ShownRun::leave(PageConnection& page) {
+void ShownRun::leave(Page& page) {
   if (open_.erase(&page) == 0) return;
   if (controller_ == &page) {
     release();
@@ -78,7 +77,7 @@ void ShownRun::release() {
   show_state_anew();
 }
 
-void ShownRun::hand_over(PageConnection& page, bool take) {
+void ShownRun::hand_over(Page& page, bool take) {
   if (!take) {
     if (controller_ == &page) release();
   } else if (controller_ == nullptr) {
@@ -92,14 +91,14 @@ void ShownRun::hand_over(PageConnection& page, bool take) {
 }
 
 /// Who only watches a replay still looks at what it likes.
-void ShownRun::show_alone(PageConnection& page, std::int64_t frame) {
+void ShownRun::show_alone(Page& page, std::int64_t frame) {
   std::optional<RecordedFrame> recorded = run_.recorded_frame(frame);
   if (recorded && broadcast_.picture()) {
     page.look_alone({broadcast_.picture()->scene, nullptr, std::move(recorded->picture)}, recorded->frame);
   }
 }
 
-void ShownRun::obey(PageConnection& page, const PageWord& word) {
+void ShownRun::obey(Page& page, const PageWord& word) {
   if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
   if (std::holds_alternative<FollowWord>(word)) return page.follow();
   const char* name = name_of(word);

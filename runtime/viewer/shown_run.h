@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "runtime/viewer/broadcast.h"
@@ -13,7 +15,22 @@
 
 namespace palpate {
 
-class PageConnection;
+/// A page as its run sees it.
+class Page {
+ public:
+  virtual ~Page() = default;
+
+  /// Sends what there is that the page has not been sent, one message after the other.
+  virtual void send_news() = 0;
+  /// A text that it must not miss.
+  virtual void say(std::string text) = 0;
+  /// It sees this from now on, whatever is shown to all.
+  virtual void look_alone(DrawnPicture picture, std::int64_t frame) = 0;
+  /// It sees what is shown to all.
+  virtual void follow() = 0;
+  /// The frame that it sees alone.
+  [[nodiscard]] virtual std::optional<std::int64_t> own_frame() const noexcept = 0;
+};
 
 /// Knows which pages see the run and which of them controls it, and takes what is posted to them. All except
 /// `post` is for the server's thread.
@@ -33,13 +50,13 @@ class ShownRun {
 
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
   [[nodiscard]] Broadcast& broadcast() noexcept { return broadcast_; }
-  [[nodiscard]] PageRole role(const PageConnection& page) const;
+  [[nodiscard]] PageRole role(const Page& page) const;
   /// It is a socket now: the only one of all has control.
-  void join(PageConnection& page);
+  void join(Page& page);
   /// It is gone, and its control with it.
-  void leave(PageConnection& page);
+  void leave(Page& page);
   /// What the controller wants is done, others are told why not.
-  void obey(PageConnection& page, const PageWord& word);
+  void obey(Page& page, const PageWord& word);
   /// Shows what was posted.
   void take_mail();
   /// Has the state sent again where that was last half a second ago.
@@ -48,16 +65,16 @@ class ShownRun {
  private:
   void show_state_anew();
   void show_all();
-  void hand_over(PageConnection& page, bool take);
+  void hand_over(Page& page, bool take);
   void release();
-  void show_alone(PageConnection& page, std::int64_t frame);
+  void show_alone(Page& page, std::int64_t frame);
 
   ViewedRun& run_;
   bool is_replay_;
   bool has_book_;
   Broadcast broadcast_;
-  std::set<PageConnection*> open_;  // those that are sockets
-  PageConnection* controller_ = nullptr;
+  std::set<Page*> open_;  // those that are sockets
+  Page* controller_ = nullptr;
   std::uint64_t joined_ = 0;
   Mailbox mailbox_;
 };

@@ -74,4 +74,11 @@ class ViewedRun {
   }
 };
 
+/// A run that is shown; `run` must live as long as it is. `is_replay`: of what was recorded, where all ticks
+/// are kept for pages that come later.
+struct RunToShow {
+  ViewedRun& run;
+  bool is_replay = false;
+};
+
 }  // namespace palpate

@@ -16,13 +16,6 @@
 
 namespace palpate {
 
-/// A run that is shown; `run` must live as long as it is. `is_replay`: of what was recorded, where all ticks
-/// are kept for pages that come later.
-struct RunToShow {
-  ViewedRun& run;
-  bool is_replay = false;
-};
-
 /// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
 /// thread; they never wait for a page. A page that is slow misses pictures, and holds up nothing else.
 class ViewerServer {

@@ -26,6 +26,7 @@
 
 #include "formats/model_file.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/factor.h"
 #include "runtime/tick/step.h"
 #include "tests/bench/palpation_paths.h"

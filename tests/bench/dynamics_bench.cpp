@@ -41,6 +41,7 @@
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/dynamics.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/packed_newmark.h"

@@ -33,6 +33,7 @@
 #include "meshes/generate.h"
 #include "precompute/compression/compression.h"
 #include "precompute/compression/selected_solver.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "runtime/body/greens.h"

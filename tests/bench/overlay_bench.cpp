@@ -38,6 +38,8 @@
 
 #include "formats/model_file.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
+#include "runtime/body/patch.h"
 #include "runtime/body/patch_maker.h"
 #include "runtime/tick/step.h"
 #include "tests/support/folders.h"

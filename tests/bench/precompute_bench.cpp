@@ -17,6 +17,7 @@
 
 #include "meshes/surface.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/greens_solver.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 
 namespace palpate::spread_plan_test {
 namespace {

@@ -11,6 +11,7 @@
 
 #include "formats/model_file.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 
 namespace palpate::verify_test {
 namespace {

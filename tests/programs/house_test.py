@@ -54,6 +54,13 @@ class Rules(unittest.TestCase):
         self.write("base/words.cpp", '\n#include "meshes/mesh.h"\n')
         self.refused("base/words.cpp:2: base and meshes include each other (meshes/mesh.h:1)")
 
+    def test_rooms_in_a_circle_are_refused(self):
+        self.write("base/list.h", '#include "base/item.h"\n')
+        self.write("base/item.h", '#include "base/error.h"\n')
+        self.assertEqual(self.check()[0], 0)
+        self.write("base/item.cpp", '#include "base/item.h"\n#include "base/list.h"\n')
+        self.refused("base/item.cpp:2: base/item, base/list include each other in a circle")
+
     def test_a_folder_of_forty_files_is_the_largest(self):
         for k in range(39):
             self.write(f"base/part{k}.h", "")

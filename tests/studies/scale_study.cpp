@@ -25,6 +25,7 @@
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/compression.h"
 #include "precompute/compression/recompression.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "tests/support/compression/column_compression.h"

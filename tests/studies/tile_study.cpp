@@ -22,6 +22,7 @@
 #include "formats/checksum.h"
 #include "precompute/columns.h"
 #include "precompute/description/description.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "precompute/plan.h"

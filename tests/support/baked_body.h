@@ -11,7 +11,7 @@
 
 #include "formats/model_file.h"
 #include "precompute/bake.h"
-#include "precompute/description/description.h"
+#include "precompute/description/read_description.h"
 
 namespace palpate::test {
 

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "runtime/devices/hid/make_hid_protocol.h"
 #include "runtime/safety/monotonic_clock.h"
 
 namespace palpate {

@@ -5,14 +5,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "runtime/devices/hid/hid_device.h"
-#include "runtime/devices/reports/device_profile.h"
-#include "runtime/devices/reports/hid_report_descriptor.h"
 #include "runtime/safety/device.h"
 
 namespace palpate {
@@ -76,11 +72,5 @@ class HidProtocol {
 
   [[nodiscard]] virtual DeviceLimits limits() const = 0;
 };
-
-/// The protocol of a profile's kind. `device` is what messages call it. `last` is the last sequence number of
-/// the time before. Throws Error when the report descriptor is not that of such a device.
-[[nodiscard]] std::unique_ptr<HidProtocol> make_hid_protocol(const DeviceProfile& profile,
-                                                             const HidReportDescriptor& descriptor,
-                                                             const std::string& device, std::uint32_t last);
 
 }  // namespace palpate

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/devices/reports/pid_reports.h"
 
 namespace palpate {
 namespace {

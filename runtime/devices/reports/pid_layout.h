@@ -12,6 +12,7 @@
 namespace palpate {
 
 constexpr std::size_t pid_axes = 2;
+constexpr std::size_t pid_report_room = 64;  ///< of a full-speed interrupt transfer, with the report id
 
 struct PidLayout {
   bool numbered = false;

@@ -12,8 +12,6 @@
 
 namespace palpate {
 
-constexpr std::size_t pid_report_room = 64;  ///< of a full-speed interrupt transfer, with the report id
-
 /// As hidapi writes it: the report id (0 where reports have none), then the report.
 struct PidReport {
   std::array<std::uint8_t, pid_report_room> bytes{};

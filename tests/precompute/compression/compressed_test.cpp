@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "matrices/hierarchical_product.h"
 #include "precompute/compressed_greens.h"
+#include "precompute/description/read_description.h"
 #include "precompute/inspect.h"
 #include "precompute/verify.h"
 #include "runtime/body/scaled_model.h"

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "precompute/description/description.h"
+#include "precompute/description/read_description.h"
 #include "precompute/draft/questions.h"
 #include "tests/support/geometry_shapes.h"
 

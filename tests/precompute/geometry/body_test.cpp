@@ -4,6 +4,7 @@
 #include <map>
 
 #include "meshes/element.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
 #include "tests/support/documentation.h"
 #include "tests/support/folders.h"

@@ -10,6 +10,7 @@
 
 #include "meshes/element.h"
 #include "meshes/generate.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/meshed_body.h"
 #include "tests/support/meshes_files.h"

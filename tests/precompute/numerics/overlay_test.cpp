@@ -13,6 +13,7 @@
 #include "overlay/condensation.h"
 #include "overlay/patch_mesh.h"
 #include "precompute/bake.h"
+#include "precompute/description/read_description.h"
 #include "precompute/numerics/overlay_regions.h"
 
 namespace palpate::overlay_test {

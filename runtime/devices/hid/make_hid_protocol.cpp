@@ -1,4 +1,4 @@
-#include "runtime/devices/hid/hid_protocol.h"
+#include "runtime/devices/hid/make_hid_protocol.h"
 
 #include "base/error.h"
 #include "runtime/devices/hid/hid_arm.h"

@@ -1,4 +1,4 @@
-#include "precompute/description/description.h"
+#include "precompute/description/read_description.h"
 
 #include <fmt/format.h>
 
