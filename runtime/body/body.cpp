@@ -12,7 +12,6 @@
 #include "meshes/surface.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
-#include "runtime/live/live_model.h"
 #include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
