@@ -193,7 +193,7 @@ Json json_room(const State& state) {
   return {{"near_nodes", entry(most.near_nodes, state.surface.near.capacity())},
           {"contact_points", entry(most.contact_points, state.max_contacts())},
           {"unknowns", entry(most.unknowns, state.scratch.rows.size())},
-          {"simplices", entry(most.simplices, state.scratch.pairs.size())}};
+          {"simplices", entry(most.simplices, state.scratch.detection.pairs.size())}};
 }
 
 Json json_tool(const Tool& tool) {

@@ -77,9 +77,9 @@ double free_slip(const Body& body, const SurfaceState& surface, const ContactPoi
 }
 
 /// The contact of the tick before that is the same one, null when there is none.
-const ContactPoint* same_contact(const Scratch& scratch, const ContactPoint& contact) noexcept {
-  const Index number = last_number(scratch, contact.feature);
-  return number < 0 ? nullptr : &scratch.last_contacts[number];
+const ContactPoint* same_contact(const LastContacts& remembered, const ContactPoint& contact) noexcept {
+  const Index number = remembered.number_of(contact.feature);
+  return number < 0 ? nullptr : &remembered.contacts[number];
 }
 
 /// What a contact's tool and surface move against each other in the tick if no force changes, and how far
@@ -101,8 +101,8 @@ Vec3 motion_of(const Body& body, const State& state, const Scratch& scratch, con
 /// What is known of a contact before it is in the problem.
 UpcomingContact announce(const Body& body, const State& state, const Scratch& scratch,
                          const ContactPoint& contact, double least_gap) noexcept {
-  UpcomingContact upcoming{.last = last_number(scratch, contact.feature)};
-  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
+  UpcomingContact upcoming{.last = scratch.last.number_of(contact.feature)};
+  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last.contacts[upcoming.last];
   upcoming.motion = motion_of(body, state, scratch, contact, last);
   upcoming.stays_open = !contact.held && (last == nullptr || last->force.isZero(0.0)) &&
                         upcoming.motion.dot(contact.frame.col(0)) > least_gap;
@@ -111,57 +111,57 @@ UpcomingContact announce(const Body& body, const State& state, const Scratch& sc
 
 /// Who comes to each place, from the first that is not held on: contacts of the tick before keep theirs, so
 /// that their rows of W do; those that stay open come last.
-void choose_order(const State& state, Scratch& scratch) noexcept {
+void choose_order(const State& state, AssemblyScratch& assembly) noexcept {
   const Index begin = state.held_count;
   const Index count = state.contact_count;
-  const auto upcoming = scratch.upcoming.begin();
+  const auto upcoming = assembly.upcoming.begin();
   const auto stays_open = [](const UpcomingContact& contact) { return contact.stays_open; };
   Index end = count - static_cast<Index>(std::count_if(upcoming + begin, upcoming + count, stays_open));
-  std::fill(scratch.order.begin() + begin, scratch.order.begin() + end, -1);
+  std::fill(assembly.order.begin() + begin, assembly.order.begin() + end, -1);
   for (Index k = begin; k < count; ++k) {
-    UpcomingContact& contact = scratch.upcoming[k];
+    UpcomingContact& contact = assembly.upcoming[k];
     if (contact.stays_open || contact.last < begin || contact.last >= end) continue;
-    contact.has_place = scratch.order[contact.last] < 0;
-    if (contact.has_place) scratch.order[contact.last] = k;
+    contact.has_place = assembly.order[contact.last] < 0;
+    if (contact.has_place) assembly.order[contact.last] = k;
   }
   Index next = begin;
   for (Index k = begin; k < count; ++k) {
-    const UpcomingContact& contact = scratch.upcoming[k];
+    const UpcomingContact& contact = assembly.upcoming[k];
     if (contact.has_place) continue;
     if (contact.stays_open) {
-      scratch.order[end++] = k;
+      assembly.order[end++] = k;
       continue;
     }
-    while (scratch.order[next] >= 0) ++next;
-    scratch.order[next] = k;
+    while (assembly.order[next] >= 0) ++next;
+    assembly.order[next] = k;
   }
 }
 
 /// Moves what stands at order[k] to k, along the cycles of the order, which is used up.
-void bring_into_order(State& state, Scratch& scratch) noexcept {
+void bring_into_order(State& state, AssemblyScratch& assembly) noexcept {
   for (Index first = state.held_count; first < state.contact_count; ++first) {
-    if (scratch.order[first] == first) continue;
+    if (assembly.order[first] == first) continue;
     const ContactPoint contact = state.contact_points[first];
-    const UpcomingContact upcoming = scratch.upcoming[first];
+    const UpcomingContact upcoming = assembly.upcoming[first];
     Index to = first;
-    for (Index from = scratch.order[to]; from != first; from = scratch.order[to]) {
+    for (Index from = assembly.order[to]; from != first; from = assembly.order[to]) {
       state.contact_points[to] = state.contact_points[from];
-      scratch.upcoming[to] = scratch.upcoming[from];
-      scratch.order[to] = to;
+      assembly.upcoming[to] = assembly.upcoming[from];
+      assembly.order[to] = to;
       to = from;
     }
     state.contact_points[to] = contact;
-    scratch.upcoming[to] = upcoming;
-    scratch.order[to] = to;
+    assembly.upcoming[to] = upcoming;
+    assembly.order[to] = to;
   }
 }
 
 /// Where contacts are many, those with friction and those that are held have a row for each axis: their
 /// compliance is that of their nodes as it stands, however the normals turn.
-void add_one_of_many(const Body& body, const State& state, Scratch& scratch, const ContactPoint& contact,
+void add_one_of_many(const Body& body, const SurfaceState& surface, Scratch& scratch, const ContactPoint& contact,
                      const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
-  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
+  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last.contacts[upcoming.last];
   if (upcoming.stays_open) return problem.add_open();
   const Index first = problem.rows;
   const bool has_axes = contact.held || contact.friction > 0.0;
@@ -169,24 +169,24 @@ void add_one_of_many(const Body& body, const State& state, Scratch& scratch, con
   for (Index i = first; i < problem.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const Vec3 direction = has_axes ? Vec3::Unit(i - first) : Vec3(contact.frame.col(0));
-    scratch.rows[at] = contact_row(body, state.surface.near, contact, direction);
+    scratch.rows[at] = contact_row(body, surface.near, contact, direction);
     problem.b[at] = direction.dot(upcoming.motion);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
 }
 
 /// The responses of the tick before in the order of this one.
-void hand_on_responses(Scratch& scratch, Index count) noexcept {
-  std::swap(scratch.response, scratch.last_response);
+void hand_on_responses(AssemblyScratch& assembly, Index count) noexcept {
+  std::swap(assembly.response, assembly.last_response);
   for (Index k = 0; k < count; ++k) {
-    const Index last = scratch.upcoming[k].last;
-    if (last >= 0 && last < scratch.response_count) {
-      scratch.response[k] = scratch.last_response[last];
+    const Index last = assembly.upcoming[k].last;
+    if (last >= 0 && last < assembly.response_count) {
+      assembly.response[k] = assembly.last_response[last];
     } else {
-      scratch.response[k].setZero();
+      assembly.response[k].setZero();
     }
   }
-  scratch.response_count = count;
+  assembly.response_count = count;
 }
 
 /// What the forces are expected to change by as the tools move: to first order, as linearise left it.
@@ -194,7 +194,7 @@ void predict(const State& state, Scratch& scratch) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     const ToolState& tool = state.tools[contact.tool];
-    const Vec3 change = scratch.response[k] * (tool.device.position - tool.last_device.position);
+    const Vec3 change = scratch.assembly.response[k] * (tool.device.position - tool.last_device.position);
     const Index first = scratch.problem.first_row(k);
     for (Index i = first; i < first + scratch.problem.rows_of(k); ++i)
       scratch.problem.prediction[i] = scratch.rows[i].force.dot(change);
@@ -203,19 +203,19 @@ void predict(const State& state, Scratch& scratch) noexcept {
 
 void add_many(const Body& body, State& state, Scratch& scratch, double least_gap) noexcept {
   for (Index k = 0; k < state.contact_count; ++k)
-    scratch.upcoming[k] = announce(body, state, scratch, state.contact_points[k], least_gap);
-  choose_order(state, scratch);
-  bring_into_order(state, scratch);
+    scratch.assembly.upcoming[k] = announce(body, state, scratch, state.contact_points[k], least_gap);
+  choose_order(state, scratch.assembly);
+  bring_into_order(state, scratch.assembly);
   for (Index k = 0; k < state.contact_count; ++k)
-    add_one_of_many(body, state, scratch, state.contact_points[k], scratch.upcoming[k]);
-  hand_on_responses(scratch, state.contact_count);
+    add_one_of_many(body, state.surface, scratch, state.contact_points[k], scratch.assembly.upcoming[k]);
+  hand_on_responses(scratch.assembly, state.contact_count);
   if (scratch.is_first_pass) predict(state, scratch);
 }
 
 void add_one_of_few(const Body& body, const State& state, Scratch& scratch,
                     const ContactPoint& contact) noexcept {
   ContactProblem& problem = scratch.problem;
-  const ContactPoint* last = same_contact(scratch, contact);
+  const ContactPoint* last = same_contact(scratch.last, contact);
   const Index first = problem.rows;
   problem.add(contact.friction, contact.held);
   const ToolState& tool = state.tools[contact.tool];
@@ -235,14 +235,14 @@ void add_one_of_few(const Body& body, const State& state, Scratch& scratch,
 
 /// The normal force by which a contact's tilt is judged: its own in the tick before, or, of one that has just
 /// become another vertex, edge or face, the mean of its tool's.
-double normal_force(const Scratch& scratch, const ContactPoint& contact, const ContactPoint* last,
+double normal_force(const LastContacts& remembered, const ContactPoint& contact, const ContactPoint* last,
                     double closed) noexcept {
   if (last != nullptr) return last->force.dot(last->frame.col(0));
   if (contact.gap > closed) return 0.0;
   double sum = 0.0;
   double count = 0.0;
-  for (Index k = 0; k < scratch.last_count; ++k) {
-    const ContactPoint& other = scratch.last_contacts[k];
+  for (Index k = 0; k < remembered.count; ++k) {
+    const ContactPoint& other = remembered.contacts[k];
     const double force = other.force.dot(other.frame.col(0));
     if (other.tool != contact.tool || other.held || force <= 0.0) continue;
     sum += force;
@@ -265,7 +265,7 @@ void add_tilt(const Body& body, const State& state, Scratch& scratch, Index numb
     scratch.rows[at] = tilt_row(body, state.surface.near, contact, radius, tangent);
     if (!scratch.problem.many) scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
     if (contact.rolls) scratch.problem.b[at] += tangent.dot(tool.device.position - tool.pose.position);
-    scratch.tilt_spring[at] = radius / force;
+    scratch.assembly.tilt_spring[at] = radius / force;
   };
   if (nodes == 3) {
     add(contact.frame.col(1));
@@ -304,23 +304,23 @@ void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
     const ContactRow& row = scratch.rows[i];
     const auto n = static_cast<std::size_t>(only_node(row));
     const Vec3& body = row.body[n];
-    scratch.row_first[i] = std::ptrdiff_t{D} * row.places[n];
-    scratch.row_body[i] = {body.x(), body.y(), D == 3 ? body.z() : 0.0, 0.0};
+    scratch.assembly.row_first[i] = std::ptrdiff_t{D} * row.places[n];
+    scratch.assembly.row_body[i] = {body.x(), body.y(), D == 3 ? body.z() : 0.0, 0.0};
   }
   for (std::size_t j = 0; j < rows; ++j) {
-    const std::array<double, 4>& f = scratch.row_body[j];
+    const std::array<double, 4>& f = scratch.assembly.row_body[j];
     std::array<const double*, D> c;
     for (std::size_t axis = 0; axis < D; ++axis)
-      c[axis] = near.row(static_cast<Index>(scratch.row_first[j]) + static_cast<Index>(axis)).data();
+      c[axis] = near.row(static_cast<Index>(scratch.assembly.row_first[j]) + static_cast<Index>(axis)).data();
     for (std::size_t i = j; i < rows; ++i) {
-      const std::ptrdiff_t first = scratch.row_first[i];
+      const std::ptrdiff_t first = scratch.assembly.row_first[i];
       Four w{};
       Four numbers;
       for (std::size_t axis = 0; axis < D; ++axis) {
         read(c[axis] + first, numbers);
         w += f[axis] * numbers;
       }
-      read(scratch.row_body[i].data(), numbers);
+      read(scratch.assembly.row_body[i].data(), numbers);
       w *= numbers;
       const double sum = D == 3 ? w[0] + w[1] + w[2] : w[0] + w[1];
       problem.w(static_cast<Index>(i), static_cast<Index>(j)) = sum;
@@ -336,7 +336,7 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
   const auto end = scratch.rows.begin() + problem.rows;
   if (std::all_of(scratch.rows.begin(), end, [](const ContactRow& row) { return only_node(row) >= 0; }))
     return assemble_between_nodes<D>(near, scratch);
-  double* __restrict y = scratch.row_response.data();
+  double* __restrict y = scratch.assembly.row_response.data();
   const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
   for (Index j = 0; j < problem.rows; ++j) {
     const ContactRow& by = scratch.rows[j];
@@ -421,8 +421,9 @@ void fill_coupling(const Tool& tool, Index number, Scratch& scratch) noexcept {
     const ContactRow& row = scratch.rows[i];
     const double is_of_tool = row.tool == number ? 1.0 : 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-      scratch.coupling[axis * rows + i] = static_cast<float>(is_of_tool * force_scale * row.force[axis]);
-      scratch.coupling[(3 + axis) * rows + i] =
+      scratch.assembly.coupling[axis * rows + i] =
+          static_cast<float>(is_of_tool * force_scale * row.force[axis]);
+      scratch.assembly.coupling[(3 + axis) * rows + i] =
           static_cast<float>(is_of_tool * moment_scale * row.moment[axis]);
     }
   }
@@ -436,7 +437,7 @@ void couple_many(const State& state, Scratch& scratch) noexcept {
     const Tool& tool = state.tools[k].tool;
     if (!is_coupled(tool)) continue;
     fill_coupling(tool, static_cast<Index>(k), scratch);
-    const float* __restrict c = scratch.coupling.data();
+    const float* __restrict c = scratch.assembly.coupling.data();
     for (Index j = 0; j < rows; ++j) {
       const float* from = problem.single_row(j);  // itself from the second tool on
       float* to = problem.single_W.data() + static_cast<std::ptrdiff_t>(j) * problem.single_stride;
@@ -503,7 +504,7 @@ void regularise(const Body& body, const State& state, Scratch& scratch) noexcept
       double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
                     state.surface.rigid_compliance;
       if (k < state.contact_count) give = std::max(give, state.surface.least_compliance - w);
-      w += give + scratch.tilt_spring[row];
+      w += give + scratch.assembly.tilt_spring[row];
       if (i > first && problem.held[k] == 0) problem.b[row] -= give * problem.lambda[row];
     }
   }
@@ -515,23 +516,23 @@ void add_change_of_forces(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   const int d = near.dimension();
   const std::ptrdiff_t width = std::ptrdiff_t{d} * near.count();
-  std::fill_n(scratch.guess_force.begin(), width, 0.0);
+  std::fill_n(scratch.assembly.guess_force.begin(), width, 0.0);
   for (Index i = 0; i < problem.rows; ++i) {
     const ContactRow& row = scratch.rows[i];
     for (std::size_t n = 0; n < 3; ++n) {
       if (row.places[n] < 0) continue;
       for (int axis = 0; axis < d; ++axis)
-        scratch.guess_force[d * row.places[n] + axis] -= problem.lambda[i] * row.body[n][axis];
+        scratch.assembly.guess_force[d * row.places[n] + axis] -= problem.lambda[i] * row.body[n][axis];
     }
   }
-  std::fill_n(scratch.row_response.begin(), width, 0.0);
+  std::fill_n(scratch.assembly.row_response.begin(), width, 0.0);
   bool changed = false;
   for (Index place = 0; place < near.count(); ++place) {
     const Vec3 force = near.force(place);
     for (int axis = 0; axis < d; ++axis) {
-      const double change = scratch.guess_force[d * place + axis] - force[axis];
+      const double change = scratch.assembly.guess_force[d * place + axis] - force[axis];
       if (std::abs(change) <= 1e-12 * force.lpNorm<1>()) continue;
-      add(near.row(d * place + axis).data(), change, scratch.row_response.data(), width);
+      add(near.row(d * place + axis).data(), change, scratch.assembly.row_response.data(), width);
       changed = true;
     }
   }
@@ -539,7 +540,7 @@ void add_change_of_forces(const NearField& near, Scratch& scratch) noexcept {
     const ContactRow& row = scratch.rows[i];
     for (std::size_t n = 0; n < 3; ++n) {
       for (int axis = 0; row.places[n] >= 0 && axis < d; ++axis)
-        problem.b[i] -= row.body[n][axis] * scratch.row_response[d * row.places[n] + axis];
+        problem.b[i] -= row.body[n][axis] * scratch.assembly.row_response[d * row.places[n] + axis];
     }
   }
 }
@@ -579,7 +580,7 @@ void regularise_many(const State& state, Scratch& scratch) noexcept {
     const double along_normal = problem.normal_part(k, problem.lambda);
     for (Index i = first; i < first + rows; ++i) {
       float& w = problem.single_row(i)[i];
-      w += static_cast<float>(give + rounding * w + scratch.tilt_spring[i]);
+      w += static_cast<float>(give + rounding * w + scratch.assembly.tilt_spring[i]);
       if (problem.held[k] == 0) problem.b[i] += give * along_normal * problem.normal[k][i - first];
     }
   }
@@ -587,14 +588,14 @@ void regularise_many(const State& state, Scratch& scratch) noexcept {
 
 /// Whether the contacts are more than the direct solvers take: by the contact points, and by how many of them
 /// carried force.
-bool are_many(const State& state, const Scratch& scratch) noexcept {
+bool are_many(const State& state, const LastContacts& remembered) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
   const bool frictionless = std::all_of(contacts.begin(), contacts.end(), [](const ContactPoint& contact) {
     return contact.held || contact.friction == 0.0;
   });
   if (frictionless) return state.contact_count > tuning.many.few_frictionless;
   if (state.contact_count > tuning.many.few_contacts) return true;
-  const auto last = std::span(scratch.last_contacts).first(static_cast<std::size_t>(scratch.last_count));
+  const auto last = std::span(remembered.contacts).first(static_cast<std::size_t>(remembered.count));
   const auto closed = std::count_if(last.begin(), last.end(), [](const ContactPoint& contact) {
     return !contact.held && !contact.force.isZero(0.0);
   });
@@ -605,8 +606,8 @@ bool are_many(const State& state, const Scratch& scratch) noexcept {
 
 void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept {
   hand_over_merged(body, state, scratch);
-  scratch.problem.clear(are_many(state, scratch));
-  std::fill(scratch.tilt_spring.begin(), scratch.tilt_spring.end(), 0.0);
+  scratch.problem.clear(are_many(state, scratch.last));
+  std::fill(scratch.assembly.tilt_spring.begin(), scratch.assembly.tilt_spring.end(), 0.0);
   const std::span<const ContactPoint> contacts = state.contacts();
   const double edge = body.mean_surface_edge();
   if (scratch.problem.many) {
@@ -617,8 +618,8 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
   const Index first_tilt_row = scratch.problem.rows;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = contacts[k];
-    const double force =
-        normal_force(scratch, contact, same_contact(scratch, contact), tuning.assembly.closed_gap * edge);
+    const double force = normal_force(scratch.last, contact, same_contact(scratch.last, contact),
+                                      tuning.assembly.closed_gap * edge);
     add_tilt(body, state, scratch, k, force, edge);
   }
   HighWater& most = scratch.high_water;
@@ -626,7 +627,7 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
   most.unknowns = std::max(most.unknowns, scratch.problem.rows);
   most.near_nodes = std::max(most.near_nodes, state.surface.near.count());
   if (scratch.problem.many) {
-    scratch.compliance.assemble(state.surface.near, scratch.rows, first_tilt_row, scratch.problem);
+    scratch.assembly.compliance.assemble(state.surface.near, scratch.rows, first_tilt_row, scratch.problem);
     note_rigid_contacts(state, scratch.problem);
     couple_many(state, scratch);
     add_change_of_forces(state.surface.near, scratch);
@@ -634,8 +635,8 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
     regularise_many(state, scratch);
     return;
   }
-  scratch.compliance.forget();
-  scratch.response_count = 0;
+  scratch.assembly.compliance.forget();
+  scratch.assembly.response_count = 0;
   if (body.dimension() == 3) {
     assemble_body_compliance<3>(state.surface.near, scratch);
   } else {

@@ -92,9 +92,9 @@ Index far_node_of(const Body& body, const NearField& near, const SimplexNodes& n
 }
 
 /// Puts one node into the near field that will be wanted soon, as those that come all at once take long.
-void want_ahead(const Body& body, SurfaceState& surface, const Scratch& scratch) noexcept {
-  if (scratch.simplex_ahead < 0 || surface.near.count() == surface.near.capacity()) return;
-  const Index node = far_node_of(body, surface.near, nodes_of(body, scratch.simplex_ahead));
+void want_ahead(const Body& body, SurfaceState& surface, const DetectionScratch& detection) noexcept {
+  if (detection.simplex_ahead < 0 || surface.near.count() == surface.near.capacity()) return;
+  const Index node = far_node_of(body, surface.near, nodes_of(body, detection.simplex_ahead));
   bool moved = false;
   want_nodes(body, surface, {node, -1, -1}, moved);
   surface.tree.refit();
@@ -110,18 +110,18 @@ NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes
 }
 
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
-/// scratch.found and `nearest` of scratch.pairs, and returns how many.
+/// scratch.detection.found and `nearest` of scratch.detection.pairs, and returns how many.
 std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scratch& scratch,
                               ToolState& tool, const Core& core, double reach) noexcept {
   const SurfaceTree& tree = surface.tree;
   const double ahead = reach + tuning.detection.ahead * body.mean_surface_edge();
-  const std::size_t all = near_core(tree, core, ahead, scratch.found);
+  const std::size_t all = near_core(tree, core, ahead, scratch.detection.found);
   const bool is_point = has_point_core(tool.tool);
   double nearest_ahead = ahead * ahead;
-  scratch.simplex_ahead = -1;
+  scratch.detection.simplex_ahead = -1;
   std::size_t count = 0;
-  for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
-    const Index simplex = scratch.found[k];
+  for (std::size_t k = 0; k < std::min(all, scratch.detection.found.size()); ++k) {
+    const Index simplex = scratch.detection.found[k];
     const SimplexNodes nodes = nodes_of(body, simplex);
     const NearestPoint nearest = touches_corners_alone(body, tool.tool, simplex)
                                      ? nearest_of_chord(tree, nodes, core, tool.tool.radius)
@@ -129,29 +129,30 @@ std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scr
     if (nearest.squared_distance > reach * reach) {
       if (nearest.squared_distance < nearest_ahead && far_node_of(body, surface.near, nodes) >= 0) {
         nearest_ahead = nearest.squared_distance;
-        scratch.simplex_ahead = simplex;
+        scratch.detection.simplex_ahead = simplex;
       }
       continue;
     }
-    scratch.found[count] = simplex;
-    scratch.found_distance[simplex] = nearest.squared_distance;
-    if (count < scratch.pairs.size()) scratch.pairs[count].nearest = nearest;
+    scratch.detection.found[count] = simplex;
+    scratch.detection.found_distance[simplex] = nearest.squared_distance;
+    if (count < scratch.detection.pairs.size()) scratch.detection.pairs[count].nearest = nearest;
     ++count;
   }
   scratch.high_water.simplices = std::max(scratch.high_water.simplices, static_cast<Index>(count));
-  if (all > scratch.found.size()) tool.status |= StepStatus::capacity_full;
-  scratch.found_count = count;
-  if (count > scratch.pairs.size()) {
+  if (all > scratch.detection.found.size()) tool.status |= StepStatus::capacity_full;
+  scratch.detection.found_count = count;
+  if (count > scratch.detection.pairs.size()) {
     tool.status |= StepStatus::capacity_full;
     const auto nearer = [&](Index a, Index b) {
-      const double da = scratch.found_distance[a];
-      const double db = scratch.found_distance[b];
+      const double da = scratch.detection.found_distance[a];
+      const double db = scratch.detection.found_distance[b];
       return da < db || (da == db && a < b);
     };
-    std::nth_element(scratch.found.begin(),
-                     scratch.found.begin() + static_cast<std::ptrdiff_t>(scratch.pairs.size()),
-                     scratch.found.begin() + static_cast<std::ptrdiff_t>(count), nearer);
-    count = scratch.pairs.size();
+    std::nth_element(
+        scratch.detection.found.begin(),
+        scratch.detection.found.begin() + static_cast<std::ptrdiff_t>(scratch.detection.pairs.size()),
+        scratch.detection.found.begin() + static_cast<std::ptrdiff_t>(count), nearer);
+    count = scratch.detection.pairs.size();
   }
   return count;
 }
@@ -159,23 +160,23 @@ std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scr
 /// Whether a candidate from `begin` on is at the same place with the same normal. `vertex`: the surface node
 /// that the place is, -1 where it is none. A node's first candidate is compared with those between nodes
 /// alone: at other nodes there is none like it.
-bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const Vec3& position,
+bool is_duplicate(const Body& body, const DetectionScratch& detection, Index begin, const Vec3& position,
                   const Vec3& normal, Index vertex) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
   const auto is_same = [&](Index k) {
-    const ContactPoint& other = scratch.candidates[k];
+    const ContactPoint& other = detection.candidates[k];
     return k >= begin && (other.position - position).squaredNorm() < near * near &&
            other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction;
   };
-  const Index at_node = vertex < 0 ? -1 : scratch.candidate_at_node[vertex];
-  const bool is_first = vertex >= 0 && (at_node < begin || at_node >= scratch.candidate_count ||
-                                        scratch.candidates[at_node].position != position);
+  const Index at_node = vertex < 0 ? -1 : detection.candidate_at_node[vertex];
+  const bool is_first = vertex >= 0 && (at_node < begin || at_node >= detection.candidate_count ||
+                                        detection.candidates[at_node].position != position);
   if (is_first) {
-    const auto between = scratch.candidates_between.begin();
-    return std::any_of(between, between + scratch.between_count, is_same);
+    const auto between = detection.candidates_between.begin();
+    return std::any_of(between, between + detection.between_count, is_same);
   }
   if (at_node >= 0 && is_same(at_node)) return true;
-  for (Index k = begin; k < scratch.candidate_count; ++k) {
+  for (Index k = begin; k < detection.candidate_count; ++k) {
     if (is_same(k)) return true;
   }
   return false;
@@ -204,20 +205,20 @@ bool is_held(const Body& body, const State& state, Index tool, const SimplexNode
 
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
 /// force.
-bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact) noexcept {
+bool rolls(const LastContacts& remembered, const Tool& tool, const ContactPoint& contact) noexcept {
   if (!has_point_core(tool) || contact.friction > 0.0) return false;
   if (std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }) == 1)
     return true;
-  const Index last = last_number(scratch, contact.feature);
+  const Index last = remembered.number_of(contact.feature);
   if (last < 0) return false;
-  const ContactPoint& before = scratch.last_contacts[last];
+  const ContactPoint& before = remembered.contacts[last];
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[tool_number];
-  if (static_cast<std::size_t>(scratch.candidate_count) == scratch.candidates.size()) {
+  if (static_cast<std::size_t>(scratch.detection.candidate_count) == scratch.detection.candidates.size()) {
     tool.status |= StepStatus::capacity_full;
     return;
   }
@@ -225,11 +226,12 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
       face_tells ? pair.normal : Vec3((pair.nearest.on_core - pair.nearest.on_simplex) / pair.distance);
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   const Index vertex = vertex_of(nodes, pair.nearest.weights);
-  if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal, vertex)) return;
+  if (is_duplicate(body, scratch.detection, begin, pair.nearest.on_simplex, normal, vertex)) return;
   if (vertex >= 0) {
-    scratch.candidate_at_node[vertex] = scratch.candidate_count;
+    scratch.detection.candidate_at_node[vertex] = scratch.detection.candidate_count;
   } else {
-    scratch.candidates_between[scratch.between_count++] = scratch.candidate_count;
+    scratch.detection.candidates_between[scratch.detection.between_count++] =
+        scratch.detection.candidate_count;
   }
   ContactPoint contact;
   contact.feature =
@@ -244,16 +246,16 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.frame = contact_frame(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
-  contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
+  contact.rolls = !face_tells && rolls(scratch.last, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
-  scratch.candidates[scratch.candidate_count++] = contact;
+  scratch.detection.candidates[scratch.detection.candidate_count++] = contact;
 }
 
 /// Whether the simplex carried force at the same tool in the tick or pass before.
-bool carried(const Scratch& scratch, Index tool, const TouchingPair& pair) noexcept {
-  const auto begin = scratch.last_contacts.begin();
-  return std::any_of(begin, begin + scratch.last_count, [&](const ContactPoint& last) {
+bool carried(const LastContacts& remembered, Index tool, const TouchingPair& pair) noexcept {
+  const auto begin = remembered.contacts.begin();
+  return std::any_of(begin, begin + remembered.count, [&](const ContactPoint& last) {
     return last.tool == tool && last.simplex == pair.simplex && !last.held && last.force.squaredNorm() > 0.0;
   });
 }
@@ -264,26 +266,26 @@ struct ToolContact {
   Core core;
   double margin;          // [m]
   double lost;            // [m] a core that is deeper than this is lost in the body
-  Index usable = 0;       // simplices of scratch.found whose nodes are in the near field
-  bool is_known = true;   // scratch.pairs have the nearest points of the core's origin
+  Index usable = 0;       // simplices of scratch.detection.found whose nodes are in the near field
+  bool is_known = true;   // scratch.detection.pairs have the nearest points of the core's origin
   Index first_candidate;  // of this tool
   double nearest_distance = std::numeric_limits<double>::infinity();  // [m] of the core's origin
   bool inside = false;  // the core's origin is behind the surface
 };
 
 /// Keeps those of `count` simplices whose nodes find room in the near field.
-void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& touch,
+void keep_usable(const Body& body, State& state, DetectionScratch& detection, ToolContact& touch,
                  std::size_t count) noexcept {
   bool moved = false;
   for (std::size_t k = 0; k < count; ++k) {
-    const Index simplex = scratch.found[k];
+    const Index simplex = detection.found[k];
     if (!want_nodes(body, state.surface, nodes_of(body, simplex), moved)) {
       state.tools[touch.number].status |= StepStatus::capacity_full;
-      leave_out_simplex(body, state, scratch, touch.number, touch.core, simplex);
+      leave_out_simplex(body, state, detection, touch.number, touch.core, simplex);
       continue;
     }
-    scratch.pairs[touch.usable].nearest = scratch.pairs[k].nearest;
-    scratch.found[touch.usable++] = simplex;
+    detection.pairs[touch.usable].nearest = detection.pairs[k].nearest;
+    detection.found[touch.usable++] = simplex;
   }
   state.surface.tree.refit();
   touch.is_known = touch.is_known && !moved;
@@ -307,16 +309,16 @@ void look_at(const Body& body, const SurfaceTree& tree, const Tool& tool, const 
 }
 
 /// Fills the pairs of the core's origin, and tells on which side of the nearest simplices it is.
-void look_from_origin(const Body& body, const SurfaceTree& tree, const Tool& tool, Scratch& scratch,
-                      ToolContact& touch) noexcept {
+void look_from_origin(const Body& body, const SurfaceTree& tree, const Tool& tool,
+                      DetectionScratch& detection, ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
-    look_at(body, tree, tool, touch, scratch.found[k], scratch.pairs[k]);
-    touch.nearest_distance = std::min(touch.nearest_distance, scratch.pairs[k].distance);
+    look_at(body, tree, tool, touch, detection.found[k], detection.pairs[k]);
+    touch.nearest_distance = std::min(touch.nearest_distance, detection.pairs[k].distance);
   }
   const double as_near = touch.nearest_distance + tuning.detection.on_surface * body.mean_surface_edge();
   double side = 0.0;
   for (Index k = 0; k < touch.usable; ++k) {
-    TouchingPair& pair = scratch.pairs[k];
+    TouchingPair& pair = detection.pairs[k];
     if (pair.distance > as_near) continue;
     find_height(tree, nodes_of(body, pair.simplex), pair);
     side += pair.height;
@@ -342,7 +344,7 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
   const double radius = state.tools[touch.number].tool.radius;
   const bool pushes_out =
       pair.height < 0.0 && ((touch.inside && pair.distance <= 2.0 * touch.nearest_distance) ||
-                            (carried(scratch, touch.number, pair) && pair.distance < touch.lost));
+                            (carried(scratch.last, touch.number, pair) && pair.distance < touch.lost));
   const bool face_tells =
       pushes_out || pair.distance < tuning.detection.on_surface * body.mean_surface_edge();
   if (face_tells && has_turned_over(body, pair)) return;
@@ -351,11 +353,11 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
 }
 
 /// Whether a node has the candidate already that the core's origin makes of it, from another simplex.
-bool is_found(const Scratch& scratch, const ToolContact& touch, const SurfaceTree& tree,
+bool is_found(const DetectionScratch& detection, const ToolContact& touch, const SurfaceTree& tree,
               Index node) noexcept {
-  const Index k = scratch.candidate_at_node[node];
-  if (k < touch.first_candidate || k >= scratch.candidate_count) return false;
-  const ContactPoint& candidate = scratch.candidates[k];
+  const Index k = detection.candidate_at_node[node];
+  if (k < touch.first_candidate || k >= detection.candidate_count) return false;
+  const ContactPoint& candidate = detection.candidates[k];
   if (candidate.position != tree.position(node)) return false;
   const Vec3 across = touch.core.origin - candidate.position;
   return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
@@ -382,7 +384,7 @@ void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolCont
 /// Whether a pair is of a disc's rim and the inside of a face that lies flat under it: what is nearest of the
 /// rim is then now here, now there, and all of it as near. One that was a contact point may be flatter, as
 /// what it does to the surface must not undo it.
-bool is_flat_under_rim(const Body& body, const Scratch& scratch, const ToolContact& touch,
+bool is_flat_under_rim(const Body& body, const LastContacts& remembered, const ToolContact& touch,
                        const TouchingPair& pair) noexcept {
   if (touch.core.disc_radius == 0.0 || touch.inside || !is_within_face(pair) || pair.height <= 0.0 ||
       pair.distance <= tuning.detection.on_surface * body.mean_surface_edge())
@@ -390,7 +392,7 @@ bool is_flat_under_rim(const Body& body, const Scratch& scratch, const ToolConta
   const std::int64_t feature = contact_feature(touch.number, pair.place, FeatureKind::face, pair.simplex);
   const DetectionTuning& limits = tuning.detection;
   return pair.normal.cross(touch.core.axis).norm() <
-         (last_number(scratch, feature) < 0 ? limits.steep : limits.still_steep);
+         (remembered.number_of(feature) < 0 ? limits.steep : limits.still_steep);
 }
 
 /// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be
@@ -405,10 +407,10 @@ void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolConta
 }
 
 /// Whether the core's origin makes no candidate of a node: it is out of reach, or has its candidate already.
-bool is_done(const Scratch& scratch, const ToolContact& touch, const SurfaceTree& tree, double reach,
-             Index node) noexcept {
+bool is_done(const DetectionScratch& detection, const ToolContact& touch, const SurfaceTree& tree,
+             double reach, Index node) noexcept {
   return (touch.core.origin - tree.position(node)).squaredNorm() > reach * reach ||
-         is_found(scratch, touch, tree, node);
+         is_found(detection, touch, tree, node);
 }
 
 /// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
@@ -422,7 +424,8 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
   const double reach = state.tools[touch.number].tool.radius + touch.margin;
   for (std::size_t n = 0; n < corners; ++n) {
     const int place = is_extended ? 2 : 0;
-    if (!is_extended && seen_from_outside && is_done(scratch, touch, tree, reach, nodes[n])) continue;
+    if (!is_extended && seen_from_outside && is_done(scratch.detection, touch, tree, reach, nodes[n]))
+      continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
     if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }
@@ -438,8 +441,9 @@ void touch_chord(const Body& body, State& state, Scratch& scratch, const ToolCon
   const double reach = state.tools[touch.number].tool.radius + touch.margin;
   if (nearest.distance > reach) return;
   if (!touch.inside && touch.nearest_distance >= touch.lost &&
-      std::all_of(nodes.begin(), nodes.end(),
-                  [&](Index node) { return node < 0 || is_done(scratch, touch, tree, reach, node); }))
+      std::all_of(nodes.begin(), nodes.end(), [&](Index node) {
+        return node < 0 || is_done(scratch.detection, touch, tree, reach, node);
+      }))
     return;
   TouchingPair pair = nearest;
   find_height(tree, nodes, pair);
@@ -461,7 +465,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
-    if (!is_flat_under_rim(body, scratch, touch, pair)) touch_pair(body, state, scratch, touch, pair);
+    if (!is_flat_under_rim(body, scratch.last, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
   const bool is_flat = is_extended || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;
@@ -510,15 +514,15 @@ bool is_blunt(const Body& body, const Tool& tool) noexcept {
 /// Turns the normals of contacts ahead by what the device moves in the tick. Not before all are found: the
 /// same place is known by the normal that it has now.
 void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, const Core& core,
-                Scratch& scratch, Index begin) noexcept {
+                DetectionScratch& detection, Index begin) noexcept {
   if (tool.device.position == tool.last_device.position &&
       tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs())
     return;
   const double radius = rolling_radius(tool.tool, body.mean_surface_edge());
   const bool blunt = is_blunt(body, tool.tool);
   const double share = going_on(tool);
-  for (Index k = begin; k < scratch.candidate_count; ++k) {
-    ContactPoint& contact = scratch.candidates[k];
+  for (Index k = begin; k < detection.candidate_count; ++k) {
+    ContactPoint& contact = detection.candidates[k];
     if (!contact.rolls && !(blunt && kind_of(contact.feature) == FeatureKind::vertex)) continue;
     const Vec3 normal = contact.frame.col(0);
     const Vec3 foreseen = core_motion(tool, core, contact) - share * last_motion(body, near, contact);
@@ -543,27 +547,27 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
                     .core = core_of(tool.tool, tool.pose, body.dimension()),
                     .margin = tool.margin,
                     .lost = tuning.detection.deepest_inside * body.mean_surface_edge(),
-                    .first_candidate = scratch.candidate_count};
+                    .first_candidate = scratch.detection.candidate_count};
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
   const std::size_t count = nearest_simplices(body, state.surface, scratch, tool, touch.core, reach);
-  touch.is_known = has_point_core(tool.tool) && count < scratch.pairs.size();
-  for (std::size_t k = count; k < scratch.found_count; ++k)
-    leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
-  keep_usable(body, state, scratch, touch, count);
-  if (scratch.is_first_pass) want_ahead(body, state.surface, scratch);
-  look_from_origin(body, state.surface.tree, tool.tool, scratch, touch);
+  touch.is_known = has_point_core(tool.tool) && count < scratch.detection.pairs.size();
+  for (std::size_t k = count; k < scratch.detection.found_count; ++k)
+    leave_out_simplex(body, state, scratch.detection, number, touch.core, scratch.detection.found[k]);
+  keep_usable(body, state, scratch.detection, touch, count);
+  if (scratch.is_first_pass) want_ahead(body, state.surface, scratch.detection);
+  look_from_origin(body, state.surface.tree, tool.tool, scratch.detection, touch);
   if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;
     tool.status |= StepStatus::inside_body;
     return;
   }
   for (Index k = 0; k < touch.usable; ++k) {
-    const TouchingPair& pair = scratch.pairs[k];
+    const TouchingPair& pair = scratch.detection.pairs[k];
     if (!is_held(body, state, number, nodes_of(body, pair.simplex)))
       touch_simplex(body, state, scratch, touch, pair);
   }
   if (scratch.is_first_pass)
-    turn_ahead(body, state.surface.near, tool, touch.core, scratch, touch.first_candidate);
+    turn_ahead(body, state.surface.near, tool, touch.core, scratch.detection, touch.first_candidate);
 }
 
 /// Puts the nodes that a held contact moves with into the near field; whether they find room.
@@ -601,28 +605,28 @@ void update_held(const Body& body, State& state) noexcept {
 
 void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   update_held(body, state);
-  scratch.candidate_count = 0;
-  scratch.between_count = 0;
-  scratch.left_out_count = 0;
+  scratch.detection.candidate_count = 0;
+  scratch.detection.between_count = 0;
+  scratch.detection.left_out_count = 0;
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     if (state.tools[k].engaged) find_candidates(body, state, scratch, k);
   }
   merge_contacts(body, state, scratch);
 
   const Index room = state.max_contacts() - state.held_count;
-  const auto begin = scratch.candidates.begin();
-  if (scratch.candidate_count > room) {
-    std::nth_element(begin, begin + room, begin + scratch.candidate_count,
+  const auto begin = scratch.detection.candidates.begin();
+  if (scratch.detection.candidate_count > room) {
+    std::nth_element(begin, begin + room, begin + scratch.detection.candidate_count,
                      [](const ContactPoint& a, const ContactPoint& b) {
                        return a.free_gap < b.free_gap || (a.free_gap == b.free_gap && a.feature < b.feature);
                      });
     state.status |= StepStatus::capacity_full;
-    for (Index k = room; k < scratch.candidate_count; ++k)
-      leave_out_contact(body, state, scratch, scratch.candidates[k]);
-    scratch.candidate_count = room;
+    for (Index k = room; k < scratch.detection.candidate_count; ++k)
+      leave_out_contact(body, state, scratch.detection, scratch.detection.candidates[k]);
+    scratch.detection.candidate_count = room;
   }
-  std::copy_n(begin, scratch.candidate_count, state.contact_points.begin() + state.held_count);
-  state.contact_count = state.held_count + scratch.candidate_count;
+  std::copy_n(begin, scratch.detection.candidate_count, state.contact_points.begin() + state.held_count);
+  state.contact_count = state.held_count + scratch.detection.candidate_count;
 }
 
 }  // namespace palpate

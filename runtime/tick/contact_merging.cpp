@@ -63,8 +63,8 @@ class Merging {
     if (state_.surface.patch != nullptr || state_.surface.near.patch() != nullptr) return false;
     Index pressed = 0;  // nodes, in the tick before
     bool has_merged = false;
-    for (Index k = 0; k < scratch_.last_count; ++k) {
-      const ContactPoint& last = scratch_.last_contacts[k];
+    for (Index k = 0; k < scratch_.last.count; ++k) {
+      const ContactPoint& last = scratch_.last.contacts[k];
       if (last.held || last.force.isZero(0.0)) continue;
       has_merged = has_merged || is_group(last);
       for_each_node(body_, state_.surface.near, last, [&](Index, double) { ++pressed; });
@@ -72,28 +72,29 @@ class Merging {
     const auto is_above = [&](Index count, Index most) {
       return count > (has_merged ? most - most / 4 : most);
     };
-    return is_above(pressed, tuning.merging.from) || is_above(scratch_.candidate_count, room_ - room_ / 4);
+    return is_above(pressed, tuning.merging.from) ||
+           is_above(scratch_.detection.candidate_count, room_ - room_ / 4);
   }
 
   void run() noexcept {
     list_candidates();
-    left_ = scratch_.candidate_count;
+    left_ = scratch_.detection.candidate_count;
     is_crowded_ = left_ > std::min(tuning.merging.crowd, room_ - room_ / 8);
     look_at_merged();
     merge_again();
     merge_more();
-    const auto begin = scratch_.candidates.begin();
-    const auto end = std::remove_if(begin, begin + scratch_.candidate_count,
+    const auto begin = scratch_.detection.candidates.begin();
+    const auto end = std::remove_if(begin, begin + scratch_.detection.candidate_count,
                                     [](const ContactPoint& contact) { return contact.tool == none; });
-    scratch_.candidate_count = static_cast<Index>(end - begin);
+    scratch_.detection.candidate_count = static_cast<Index>(end - begin);
   }
 
  private:
   void list_candidates() noexcept {
     std::vector<Index>& candidate_of_node = scratch_.merging.candidate_of_node;
     std::fill(candidate_of_node.begin(), candidate_of_node.end(), none);
-    for (Index k = 0; k < scratch_.candidate_count; ++k) {
-      const Index node = vertex_of(scratch_.candidates[k]);
+    for (Index k = 0; k < scratch_.detection.candidate_count; ++k) {
+      const Index node = vertex_of(scratch_.detection.candidates[k]);
       if (node < 0) continue;
       candidate_of_node[node] = candidate_of_node[node] == none ? k : several;
     }
@@ -102,14 +103,14 @@ class Merging {
   /// The one candidate at a node, null where there is none or there are several.
   [[nodiscard]] ContactPoint* candidate_at(Index node) const noexcept {
     const Index k = scratch_.merging.candidate_of_node[node];
-    return k < 0 ? nullptr : &scratch_.candidates[k];
+    return k < 0 ? nullptr : &scratch_.detection.candidates[k];
   }
 
   /// Those groups of the tick before that are still pressed by all their nodes, and how far these have come
   /// apart since.
   void look_at_merged() noexcept {
-    for (Index k = 0; k < scratch_.last_count; ++k) {
-      const ContactPoint& last = scratch_.last_contacts[k];
+    for (Index k = 0; k < scratch_.last.count; ++k) {
+      const ContactPoint& last = scratch_.last.contacts[k];
       if (!is_group(last) || last.force.isZero(0.0)) continue;
       double mean = 0.0;
       bool is_whole = true;
@@ -145,7 +146,7 @@ class Merging {
       const MergedGroup& group = scratch_.merging.merged[k];
       const bool may_part = k >= merged_count_ - tuning.merging.most_parted && left_ <= room_;
       if (may_part && group.defect > most) continue;
-      const Index number = scratch_.last_contacts[group.last].aggregate;
+      const Index number = scratch_.last.contacts[group.last].aggregate;
       if (state_.surface.near.want(body_, body_.aggregate_node(number))) merge(number);
     }
   }
@@ -153,8 +154,8 @@ class Merging {
   /// Merges the nodes of other groups, by the forces that they carried.
   void merge_more() noexcept {
     Index more = left_ > room_ ? left_ : tuning.merging.most_new;
-    for (Index k = 0; k < scratch_.candidate_count && more > 0; ++k) {
-      const ContactPoint& candidate = scratch_.candidates[k];
+    for (Index k = 0; k < scratch_.detection.candidate_count && more > 0; ++k) {
+      const ContactPoint& candidate = scratch_.detection.candidates[k];
       const Index node = candidate.tool == none ? none : vertex_of(candidate);
       const Index group = node < 0 ? none : body_.aggregates().of_node(node);
       if (group < 0 || scratch_.merging.candidate_of_node[node] != k) continue;
@@ -219,9 +220,9 @@ class Merging {
     const ContactPoint* at = candidate_at(node);
     if (at == nullptr || at->friction != candidate.friction || !are_alike(at->feature, candidate.feature))
       return nullptr;
-    const Index number = last_number(scratch_, at->feature);
+    const Index number = scratch_.last.number_of(at->feature);
     if (number == none) return nullptr;
-    const ContactPoint& last = scratch_.last_contacts[number];
+    const ContactPoint& last = scratch_.last.contacts[number];
     return last.force.dot(last.frame.col(0)) > 0.0 ? &last : nullptr;
   }
 
@@ -269,30 +270,30 @@ class Merging {
 };
 
 /// Lists the contacts of the tick before anew, as features have changed.
-void list_features(Scratch& scratch) noexcept {
-  std::fill(scratch.last_of_feature.begin(), scratch.last_of_feature.end(), none);
-  for (Index k = 0; k < scratch.last_count; ++k) enter_feature(scratch, k);
+void list_features(LastContacts& remembered) noexcept {
+  std::fill(last.of_feature.begin(), last.of_feature.end(), none);
+  for (Index k = 0; k < remembered.count; ++k) remembered.enter(k);
 }
 
 /// Shares a group's force out among its nodes. Where there is no room for all, some begin without.
 void part_last(const Body& body, const NearField& near, Scratch& scratch, Index number) noexcept {
-  const ContactPoint group = scratch.last_contacts[number];
-  const Eigen::Matrix3d response = scratch.response[number];
+  const ContactPoint group = scratch.last.contacts[number];
+  const Eigen::Matrix3d response = scratch.assembly.response[number];
   const Index place = near.place_of(body.aggregate_node(group.aggregate));
   if (place < 0) return;
   bool is_first = true;
   near.for_each_member(place, [&](Index node, double, const Eigen::Matrix3d& map) {
-    if (!is_first && static_cast<std::size_t>(scratch.last_count) == scratch.last_contacts.size()) return;
-    const Index to = is_first ? number : scratch.last_count++;
-    ContactPoint& part = scratch.last_contacts[to];
+    if (!is_first && static_cast<std::size_t>(scratch.last.count) == scratch.last.contacts.size()) return;
+    const Index to = is_first ? number : scratch.last.count++;
+    ContactPoint& part = scratch.last.contacts[to];
     part = group;
     part.aggregate = none;
     part.nodes = {node, none, none};
     part.feature = feature_of_vertex(group.feature, node);
     part.force = map * group.force;
     part.frame.col(0) = (map * group.frame.col(0)).normalized();
-    if (to == scratch.response_count) ++scratch.response_count;
-    if (to < scratch.response_count) scratch.response[to] = map * response;
+    if (to == scratch.assembly.response_count) ++scratch.assembly.response_count;
+    if (to < scratch.assembly.response_count) scratch.assembly.response[to] = map * response;
     is_first = false;
   });
 }
@@ -305,18 +306,18 @@ bool merge_last(const Body& body, const NearField& near, Scratch& scratch,
   Vec3 carry = Vec3::Zero();
   Eigen::Matrix3d response = Eigen::Matrix3d::Zero();
   for_each_node(body, near, group, [&](Index node, double weight) {
-    const Index last = last_number(scratch, feature_of_vertex(group.feature, node));
+    const Index last = scratch.last.number_of(feature_of_vertex(group.feature, node));
     if (last == none) return;
-    ContactPoint& from = scratch.last_contacts[last];
+    ContactPoint& from = scratch.last.contacts[last];
     force += from.force;
     carry += weight * from.carry;
-    if (last < scratch.response_count) response += scratch.response[last];
+    if (last < scratch.assembly.response_count) response += scratch.assembly.response[last];
     from.force.setZero();
     from.feature = feature_of_nobody(last);
     if (first == none) first = last;
   });
   if (first == none) return false;
-  ContactPoint& merged = scratch.last_contacts[first];
+  ContactPoint& merged = scratch.last.contacts[first];
   merged.aggregate = group.aggregate;
   merged.nodes = group.nodes;
   merged.weights = group.weights;
@@ -324,7 +325,7 @@ bool merge_last(const Body& body, const NearField& near, Scratch& scratch,
   merged.frame = group.frame;
   merged.force = force;
   merged.carry = carry;
-  if (first < scratch.response_count) scratch.response[first] = response;
+  if (first < scratch.assembly.response_count) scratch.assembly.response[first] = response;
   return true;
 }
 
@@ -346,20 +347,20 @@ void hand_over_merged(const Body& body, const State& state, Scratch& scratch) no
   for (const ContactPoint& contact : state.contacts()) {
     if (is_group(contact)) merging.feature[contact.aggregate] = contact.feature;
   }
-  const Index before = scratch.last_count;
+  const Index before = scratch.last.count;
   for (Index k = 0; k < before; ++k) {
-    const ContactPoint& last = scratch.last_contacts[k];
+    const ContactPoint& last = scratch.last.contacts[k];
     if (!is_group(last) || merging.feature[last.aggregate] == last.feature) continue;
     part_last(body, near, scratch, k);
     merging.has_changed = true;
   }
-  if (merging.has_changed) list_features(scratch);
+  if (merging.has_changed) list_features(scratch.last);
   for (const ContactPoint& contact : state.contacts()) {
     if (!is_group(contact)) continue;
     merging.feature[contact.aggregate] = none;
-    if (last_number(scratch, contact.feature) != none) continue;
+    if (scratch.last.number_of(contact.feature) != none) continue;
     if (!merge_last(body, near, scratch, contact)) continue;
-    list_features(scratch);
+    list_features(scratch.last);
     merging.has_changed = true;
   }
 }

@@ -54,8 +54,8 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
 /// A contact whose point moves from a face over its edge may be thrown back and forth by Newton's method,
 /// which follows one of them at a time. While nothing else moves, it goes half the way when it turns back.
 /// Not where other contacts find room than in the tick before: half way there belongs to neither.
-void halve_return(const Body& body, State& state, const Scratch& scratch) noexcept {
-  const bool returns = state.still_ticks > 1 && scratch.left_out_count == 0 && !is_released(body, state) &&
+void halve_return(const Body& body, State& state, const DetectionScratch& detection) noexcept {
+  const bool returns = state.still_ticks > 1 && detection.left_out_count == 0 && !is_released(body, state) &&
                        std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
                          return (tool.contact_wrench.force - tool.last_force).dot(tool.last_change) < 0.0;
                        });
@@ -84,10 +84,10 @@ bool is_rough(const Body& body, const State& state) noexcept {
 /// Whether another pass would be quick, and is not past a release, from which the body swings.
 bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
-  const bool was_easy = problem.many
-                            ? problem.rows <= tuning.passes.most_rows && scratch.newton_krylov.was_easy()
-                            : problem.frictionless || scratch.cone_solver.was_easy();
-  return was_easy && !scratch.was_improved && !is_released(body, state);
+  const bool was_easy =
+      problem.many ? problem.rows <= tuning.passes.most_rows && scratch.solvers.newton_krylov.was_easy()
+                   : problem.frictionless || scratch.solvers.cone_solver.was_easy();
+  return was_easy && !scratch.solvers.was_improved && !is_released(body, state);
 }
 
 /// Takes up the patch that is wanted. Where there is no room for it the old one stays.
@@ -105,8 +105,8 @@ bool changes_nothing(const Scratch& scratch) noexcept {
   if ((problem.frictionless && !problem.many) || scratch.merging.has_changed) return false;
   double largest = 0.0;
   double all = 0.0;
-  for (Index k = 0; k < scratch.last_count; ++k) {
-    const double squared = scratch.last_contacts[k].force.squaredNorm();
+  for (Index k = 0; k < scratch.last.count; ++k) {
+    const double squared = scratch.last.contacts[k].force.squaredNorm();
     largest = std::max(largest, squared);
     all += squared;
   }
@@ -127,30 +127,30 @@ void tell_rigid_contacts(State& state) noexcept {
 }
 
 /// Back to the contacts that were solved for.
-void recall_contacts(State& state, const Scratch& scratch) noexcept {
-  std::copy_n(scratch.last_contacts.begin(), scratch.last_count, state.contact_points.begin());
-  state.contact_count = scratch.last_count;
+void recall_contacts(State& state, const LastContacts& remembered) noexcept {
+  std::copy_n(remembered.contacts.begin(), remembered.count, state.contact_points.begin());
+  state.contact_count = remembered.count;
 }
 
 /// One step of Newton's method about where everything is now.
 ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   assemble_contact(body, state, scratch);
   std::copy_n(scratch.problem.lambda.begin(), scratch.problem.rows, scratch.problem.guess.begin());
-  scratch.is_solved = solve_problem(scratch);
-  if (!scratch.is_solved) state.status |= StepStatus::not_converged;
+  scratch.solvers.is_solved = solve_problem(scratch);
+  if (!scratch.solvers.is_solved) state.status |= StepStatus::not_converged;
   if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
     return ContactOutcome::not_finite;
   }
-  if (scratch.is_solved && scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way &&
+  if (scratch.solvers.is_solved && scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way &&
       changes_nothing(scratch)) {
-    recall_contacts(state, scratch);
+    recall_contacts(state, scratch.last);
     tell_rigid_contacts(state);
     return ContactOutcome::unchanged;
   }
   apply_forces(state, scratch);
   retreat_from_leaps(body, state);
-  if (scratch.is_first_pass) halve_return(body, state, scratch);
+  if (scratch.is_first_pass) halve_return(body, state, scratch.detection);
   move_tools(body, state);
   move_near_surface(body, state.surface);
   return ContactOutcome::solved;
@@ -165,7 +165,7 @@ Vec3 carried_slip(const Scratch& scratch, Index k) noexcept {
   Vec3 motion = Vec3::Zero();
   for (Index i = 0; i < problem.rows_of(k); ++i) {
     force[i] = problem.lambda[problem.first_row(k) + i];
-    motion[i] = scratch.newton_krylov.motion()[problem.first_row(k) + i];
+    motion[i] = scratch.solvers.newton_krylov.motion()[problem.first_row(k) + i];
   }
   const double normal = n.dot(force);
   const double bound = problem.friction[k] * normal * (1.0 - tuning.many.slipping);
@@ -196,27 +196,29 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
 }  // namespace
 
 bool solve_problem(Scratch& scratch) noexcept {
-  scratch.was_improved = false;
-  if (scratch.problem.many) return scratch.newton_krylov.solve(scratch.problem);
-  if (scratch.problem.frictionless) return scratch.active_set.solve(scratch.problem);
-  if (scratch.cone_solver.solve(scratch.problem)) return true;
+  scratch.solvers.was_improved = false;
+  if (scratch.problem.many) return scratch.solvers.newton_krylov.solve(scratch.problem);
+  if (scratch.problem.frictionless) return scratch.solvers.active_set.solve(scratch.problem);
+  if (scratch.solvers.cone_solver.solve(scratch.problem)) return true;
   // Newton's steps run in circles on nearly singular W where sweeps go on. From there they settle the rest.
-  scratch.was_improved = true;
-  scratch.newton_krylov.improve_few(scratch.problem);
-  return scratch.cone_solver.solve(scratch.problem);
+  scratch.solvers.was_improved = true;
+  scratch.solvers.newton_krylov.improve_few(scratch.problem);
+  return scratch.solvers.cone_solver.solve(scratch.problem);
 }
 
 void find_force_changes(Scratch& scratch, int changes) noexcept {
   const ContactProblem& problem = scratch.problem;
   if (problem.many) {
-    scratch.newton_krylov.derivative(problem, changes, scratch.row_change, scratch.force_change);
+    scratch.solvers.newton_krylov.derivative(problem, changes, scratch.changes.of_rows,
+                                             scratch.changes.of_forces);
   } else if (problem.frictionless) {
-    scratch.active_set.derivative(problem, changes, scratch.row_change, scratch.force_change);
+    scratch.solvers.active_set.derivative(problem, changes, scratch.changes.of_rows,
+                                          scratch.changes.of_forces);
   } else {
     for (std::size_t s = 0; s < static_cast<std::size_t>(changes); ++s) {
       const std::size_t begin = s * static_cast<std::size_t>(problem.rows);
-      scratch.cone_solver.derivative(problem, std::span(scratch.row_change).subspan(begin),
-                                     std::span(scratch.force_change).subspan(begin));
+      scratch.solvers.cone_solver.derivative(problem, std::span(scratch.changes.of_rows).subspan(begin),
+                                             std::span(scratch.changes.of_forces).subspan(begin));
     }
   }
 }
@@ -263,13 +265,13 @@ ContactOutcome solve_contact(const Body& body, State& state, Scratch& scratch) n
            may_repeat(body, state, scratch);
   };
   for (int pass = 1; wants_pass(pass); ++pass) {
-    remember(state.contacts(), scratch);
+    scratch.last.remember(state.contacts());
     find_contacts(body, state, scratch);
     rough = is_rough(body, state);
     if (rough) {
       outcome = solve_pass(body, state, scratch);
     } else {
-      recall_contacts(state, scratch);
+      recall_contacts(state, scratch.last);
     }
   }
   return outcome;

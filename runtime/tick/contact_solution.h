@@ -11,8 +11,9 @@ namespace palpate {
 /// the cone solver. False where it did not reach its tolerance.
 bool solve_problem(Scratch& scratch) noexcept;
 
-/// Changes of lambda by changes of b: the first `changes` that scratch.row_change has, one after the other,
-/// into scratch.force_change, which holds a guess before where contacts are many. After solve_problem.
+/// Changes of lambda by changes of b: the first `changes` that scratch.changes.of_rows has, one after the
+/// other, into scratch.changes.of_forces, which holds a guess before where contacts are many. After
+/// solve_problem.
 void find_force_changes(Scratch& scratch, int changes) noexcept;
 
 /// Gives scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.

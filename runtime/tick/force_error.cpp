@@ -11,14 +11,14 @@
 namespace palpate {
 namespace {
 
-void leave_out(const Body& body, const State& state, Scratch& scratch, LeftOut place,
+void leave_out(const Body& body, const State& state, DetectionScratch& detection, LeftOut place,
                const std::array<Index, 3>& nodes, const std::array<double, 3>& weights) noexcept {
-  if (static_cast<std::size_t>(scratch.left_out_count) == scratch.left_out.size()) return;
+  if (static_cast<std::size_t>(detection.left_out_count) == detection.left_out.size()) return;
   place.node =
       nodes[static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin())];
   if (place.node < 0 || !body.surface_moves(place.node)) return;
   place.apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);
-  scratch.left_out[scratch.left_out_count++] = place;
+  detection.left_out[detection.left_out_count++] = place;
 }
 
 /// How deep the tool has come to be there [m].
@@ -62,20 +62,21 @@ struct Pressed {
 
 /// Those that are deeper than what a tick leaves at contacts, too.
 template <class Visit>
-void for_each_pressed(const State& state, const Scratch& scratch, Index tool, double edge,
+void for_each_pressed(const State& state, const DetectionScratch& detection, Index tool, double edge,
                       Visit&& visit) noexcept {
   const double least = tuning.passes.penetration * edge;
-  for (Index k = 0; k < scratch.left_out_count; ++k) {
-    const LeftOut& place = scratch.left_out[k];
+  for (Index k = 0; k < detection.left_out_count; ++k) {
+    const LeftOut& place = detection.left_out[k];
     if (place.tool != tool) continue;
     const double depth = depth_now(state, place);
     if (depth > least) visit(place, depth);
   }
 }
 
-Pressed count_pressed(const State& state, const Scratch& scratch, Index tool, double edge) noexcept {
+Pressed count_pressed(const State& state, const DetectionScratch& detection, Index tool,
+                      double edge) noexcept {
   Pressed pressed;
-  for_each_pressed(state, scratch, tool, edge, [&](const LeftOut& place, double) {
+  for_each_pressed(state, detection, tool, edge, [&](const LeftOut& place, double) {
     pressed.contact_points += place.contact_points;
     ++pressed.places;
   });
@@ -93,24 +94,27 @@ double missing_of_left_out(const Body& body, const State& state, Scratch& scratc
   std::size_t count = 0;
   Index deepest = -1;
   double depth_there = 0.0;
-  for_each_pressed(state, scratch, tool, body.mean_surface_edge(), [&](const LeftOut& place, double depth) {
-    if (seen++ % stride != 0) return;
-    scratch.left_out_nodes[count] = stored_node(body, place.node);
-    force[count] =
-        static_cast<double>(stride) * place.contact_points * closing_force(body, state, place, depth);
-    normal[count] = place.normal;
-    if (depth > depth_there) {
-      depth_there = depth;
-      deepest = static_cast<Index>(count);
-    }
-    ++count;
-  });
+  for_each_pressed(
+      state, scratch.detection, tool, body.mean_surface_edge(), [&](const LeftOut& place, double depth) {
+        if (seen++ % stride != 0) return;
+        scratch.force_error.left_out_nodes[count] = stored_node(body, place.node);
+        force[count] =
+            static_cast<double>(stride) * place.contact_points * closing_force(body, state, place, depth);
+        normal[count] = place.normal;
+        if (depth > depth_there) {
+          depth_there = depth;
+          deepest = static_cast<Index>(count);
+        }
+        ++count;
+      });
   if (deepest < 0) return 0.0;
   const std::size_t row = static_cast<std::size_t>(deepest);
   const std::ptrdiff_t width = d * static_cast<std::ptrdiff_t>(count);
-  const std::span<double> blocks(scratch.left_out_blocks.data(), static_cast<std::size_t>(d * width));
-  state.surface.near.load().greens(body).gather(scratch.left_out_nodes[row],
-                                                std::span(scratch.left_out_nodes).first(count), blocks);
+  const std::span<double> blocks(scratch.force_error.left_out_blocks.data(),
+                                 static_cast<std::size_t>(d * width));
+  state.surface.near.load().greens(body).gather(scratch.force_error.left_out_nodes[row],
+                                                std::span(scratch.force_error.left_out_nodes).first(count),
+                                                blocks);
   const double coupling = 1.0 / state.tools[tool].tool.coupling_stiffness;
   Vec3 sum = Vec3::Zero();
   double given_way = 0.0;
@@ -127,15 +131,15 @@ double missing_of_left_out(const Body& body, const State& state, Scratch& scratc
 /// such steps run in circles: there they are much too long, the residual says much too little, and the truth
 /// lies between (docs/decisions).
 double error_of_solver(const Scratch& scratch, double step) noexcept {
-  if (scratch.is_solved) return 0.0;
+  if (scratch.solvers.is_solved) return 0.0;
   return scratch.problem.many ? tuning.hand.error_margin * step
-                              : std::sqrt(step * scratch.imbalance.residual());
+                              : std::sqrt(step * scratch.force_error.imbalance.residual());
 }
 
 }  // namespace
 
-void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, Index tool, const Core& core,
-                       Index simplex) noexcept {
+void leave_out_simplex(const Body& body, const State& state, DetectionScratch& detection, Index tool,
+                       const Core& core, Index simplex) noexcept {
   const Tool& shape = state.tools[tool].tool;
   const SimplexNodes nodes = nodes_of(body, simplex);
   const NearestPoint nearest = touches_corners_alone(body, shape, simplex)
@@ -143,7 +147,7 @@ void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, I
                                    : nearest_points(state.surface.tree, nodes, core, has_point_core(shape));
   const double distance = std::sqrt(nearest.squared_distance);
   if (!(distance > 0.0 && distance < shape.radius)) return;
-  leave_out(body, state, scratch,
+  leave_out(body, state, detection,
             {.tool = tool,
              .normal = (nearest.on_core - nearest.on_simplex) / distance,
              .gap = distance - shape.radius,
@@ -151,37 +155,39 @@ void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, I
             nodes, nearest.weights);
 }
 
-void leave_out_contact(const Body& body, const State& state, Scratch& scratch,
+void leave_out_contact(const Body& body, const State& state, DetectionScratch& detection,
                        const ContactPoint& contact) noexcept {
-  leave_out(body, state, scratch, {.tool = contact.tool, .normal = contact.frame.col(0), .gap = contact.gap},
-            contact.nodes, contact.weights);
+  leave_out(body, state, detection,
+            {.tool = contact.tool, .normal = contact.frame.col(0), .gap = contact.gap}, contact.nodes,
+            contact.weights);
 }
 
 void begin_force_error(Scratch& scratch) noexcept {
-  std::fill(scratch.missing_force.begin(), scratch.missing_force.end(), Vec3::Zero());
-  if (scratch.is_solved) return;
-  scratch.imbalance.find(scratch.problem);
+  std::fill(scratch.force_error.missing_force.begin(), scratch.force_error.missing_force.end(), Vec3::Zero());
+  if (scratch.solvers.is_solved) return;
+  scratch.force_error.imbalance.find(scratch.problem);
   for (Index i = 0; i < scratch.problem.rows; ++i) {
     const ContactRow& row = scratch.rows[i];
-    if (row.tool >= 0) scratch.missing_force[row.tool] += scratch.imbalance.change()[i] * row.force;
+    if (row.tool >= 0)
+      scratch.force_error.missing_force[row.tool] += scratch.force_error.imbalance.change()[i] * row.force;
   }
 }
 
 void note_answer(Scratch& scratch, Index tool, int axis, Index begin) noexcept {
-  if (scratch.is_solved) return;
+  if (scratch.solvers.is_solved) return;
   double sum = 0.0;
   for (Index i = 0; i < scratch.problem.rows; ++i)
-    sum += scratch.force_change[begin + i] * scratch.imbalance.motion()[i];
-  scratch.missing_force[tool][axis] += sum;
+    sum += scratch.changes.of_forces[begin + i] * scratch.force_error.imbalance.motion()[i];
+  scratch.force_error.missing_force[tool][axis] += sum;
 }
 
 void find_force_errors(const Body& body, State& state, Scratch& scratch) noexcept {
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
     ToolState& tool = state.tools[k];
     const auto number = static_cast<Index>(k);
-    tool.force_error = error_of_solver(scratch, scratch.missing_force[k].norm());
+    tool.force_error = error_of_solver(scratch, scratch.force_error.missing_force[k].norm());
     const Pressed pressed =
-        tool.engaged ? count_pressed(state, scratch, number, body.mean_surface_edge()) : Pressed{};
+        tool.engaged ? count_pressed(state, scratch.detection, number, body.mean_surface_edge()) : Pressed{};
     tool.left_out = static_cast<Index>(std::ceil(pressed.contact_points));
     if (pressed.places > 0)
       tool.force_error +=

@@ -6,20 +6,20 @@
 
 namespace palpate {
 
-/// Notes a simplex of scratch.found that found no room, as far as the tool reaches into it.
-void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, Index tool, const Core& core,
-                       Index simplex) noexcept;
+/// Notes a simplex of scratch.detection.found that found no room, as far as the tool reaches into it.
+void leave_out_simplex(const Body& body, const State& state, DetectionScratch& detection, Index tool,
+                       const Core& core, Index simplex) noexcept;
 
 /// Notes a contact point that found no room.
-void leave_out_contact(const Body& body, const State& state, Scratch& scratch,
+void leave_out_contact(const Body& body, const State& state, DetectionScratch& detection,
                        const ContactPoint& contact) noexcept;
 
-/// Before the local models of a tick are made: fills scratch.missing_force [tools] with what the forces of a
-/// problem that was not solved change by at once, in one more step of Newton's method.
+/// Before the local models of a tick are made: fills scratch.force_error.missing_force [tools] with what the
+/// forces of a problem that was not solved change by at once, in one more step of Newton's method.
 void begin_force_error(Scratch& scratch) noexcept;
 
-/// Takes in how the forces answer to a motion of the tool along an axis (scratch.force_change from `begin`
-/// on): what the tool lacks along that axis.
+/// Takes in how the forces answer to a motion of the tool along an axis (scratch.changes.of_forces from
+/// `begin` on): what the tool lacks along that axis.
 void note_answer(Scratch& scratch, Index tool, int axis, Index begin) noexcept;
 
 /// Fills force_error and left_out of the tools, once surface and tools are where the forces have them. Of

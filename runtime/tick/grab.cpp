@@ -53,11 +53,11 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
 }
 
 /// Grab: what is closed is held; if nothing is, the surface within reach.
-void begin_hold(const Body& body, State& state, const Scratch& scratch, Index number) noexcept {
+void begin_hold(const Body& body, State& state, const LastContacts& remembered, Index number) noexcept {
   ToolState& tool = state.tools[number];
   const Index before = state.held_count;
-  for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
-    const ContactPoint& contact = scratch.last_contacts[k];
+  for (Index k = 0; k < remembered.count && state.held_count < state.max_contacts(); ++k) {
+    const ContactPoint& contact = remembered.contacts[k];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
       hold_contact(body, state, contact);
   }
@@ -77,10 +77,10 @@ void end_hold(State& state, Index number) noexcept {
 
 }  // namespace
 
-void update_holds(const Body& body, State& state, const Scratch& scratch) noexcept {
+void update_holds(const Body& body, State& state, const LastContacts& remembered) noexcept {
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     const ToolState& tool = state.tools[k];
-    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, scratch, k);
+    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, last, k);
     if (!tool.device.grab && tool.holding) end_hold(state, k);
   }
 }

@@ -27,7 +27,7 @@ Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
 }
 
 /// Motions along the rows when the device moves by `motion`, and is turned by `turn` about its origin:
-/// [rows] of scratch.row_change from `begin` on.
+/// [rows] of scratch.changes.of_rows from `begin` on.
 void fill_row_change(const State& state, Scratch& scratch, Index number, const Vec3& motion, const Vec3& turn,
                      Index begin = 0) noexcept {
   const ContactProblem& problem = scratch.problem;
@@ -37,10 +37,11 @@ void fill_row_change(const State& state, Scratch& scratch, Index number, const V
     Vec3 there = contact.tool == number ? motion : Vec3::Zero();
     if (contact.tool == number && !contact.rolls) there += turn.cross(contact.arm);
     for (Index i = first; i < first + problem.rows_of(k); ++i)
-      scratch.row_change[begin + i] = scratch.rows[i].force.dot(there);
+      scratch.changes.of_rows[begin + i] = scratch.rows[i].force.dot(there);
   }
   for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i)
-    scratch.row_change[begin + i] = scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
+    scratch.changes.of_rows[begin + i] =
+        scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
 }
 
 /// How far a free tool may move before it touches: what its nearest contact point leaves.
@@ -51,7 +52,7 @@ void linearise_free(const State& state, ToolState& tool, Index number) noexcept 
   }
 }
 
-/// Change of the tool's wrench by the change of forces that begins at `begin` of scratch.force_change.
+/// Change of the tool's wrench by the change of forces that begins at `begin` of scratch.changes.of_forces.
 Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   Wrench change;
@@ -61,13 +62,13 @@ Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index
     const Index first = problem.first_row(k);
     Vec3 force = Vec3::Zero();
     for (Index i = first; i < first + problem.rows_of(k); ++i)
-      force += scratch.force_change[begin + i] * scratch.rows[i].force;
+      force += scratch.changes.of_forces[begin + i] * scratch.rows[i].force;
     change.force += force;
     if (!contact.rolls) change.torque += contact.arm.cross(force);
   }
   for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i) {
     if (scratch.rows[i].tool == number)
-      change.force += scratch.force_change[begin + i] * scratch.rows[i].force;
+      change.force += scratch.changes.of_forces[begin + i] * scratch.rows[i].force;
   }
   return change;
 }
@@ -77,7 +78,7 @@ Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index
 void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   const std::span<const double> change =
-      std::span(scratch.force_change).subspan(static_cast<std::size_t>(begin));
+      std::span(scratch.changes.of_forces).subspan(static_cast<std::size_t>(begin));
   for (Index k = 0; k < state.contact_count; ++k) {
     if (state.contact_points[k].held) continue;
     const double rate = std::abs(problem.normal_part(k, change));
@@ -101,14 +102,14 @@ void guess_force_changes(const State& state, Scratch& scratch, Index number) noe
   const ContactProblem& problem = scratch.problem;
   if (!problem.many) return;
   const int d = problem.dimension;
-  std::fill_n(scratch.force_change.begin(), d * problem.rows, 0.0);
+  std::fill_n(scratch.changes.of_forces.begin(), d * problem.rows, 0.0);
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     if (contact.tool != number) continue;
     for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
       for (int axis = 0; axis < d; ++axis)
-        scratch.force_change[axis * problem.rows + i] =
-            scratch.rows[i].force.dot(scratch.response[k].col(axis));
+        scratch.changes.of_forces[axis * problem.rows + i] =
+            scratch.rows[i].force.dot(scratch.assembly.response[k].col(axis));
     }
   }
 }
@@ -118,11 +119,11 @@ void keep_force_changes(const State& state, Scratch& scratch, Index number) noex
   if (!problem.many) return;
   for (Index k = 0; k < state.contact_count; ++k) {
     if (state.contact_points[k].tool != number) continue;
-    Eigen::Matrix3d& response = scratch.response[k];
+    Eigen::Matrix3d& response = scratch.assembly.response[k];
     response.setZero();
     for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
       for (int axis = 0; axis < problem.dimension; ++axis)
-        response.col(axis) += scratch.force_change[axis * problem.rows + i] * scratch.rows[i].force;
+        response.col(axis) += scratch.changes.of_forces[axis * problem.rows + i] * scratch.rows[i].force;
     }
   }
 }
@@ -134,7 +135,7 @@ Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& 
   const Eigen::AngleAxisd turned(tool.device.orientation * tool.last_device.orientation.conjugate());
   const Vec3 turn = turned.angle() * turned.axis();
   fill_row_change(state, scratch, number, Vec3::Zero(), turn);
-  std::fill_n(scratch.force_change.begin(), scratch.problem.rows, 0.0);
+  std::fill_n(scratch.changes.of_forces.begin(), scratch.problem.rows, 0.0);
   find_force_changes(scratch, 1);
   Wrench change = wrench_of(state, scratch, number, 0);
   for (const ContactPoint& contact : state.contacts()) {
@@ -178,7 +179,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     tool.greens_error =
         std::hypot(tool.greens_error,
                    greens_error(state.surface.near, scratch.greens_error, {scratch.rows.data(), count},
-                                {scratch.force_change.data() + axis * rows, count}));
+                                {scratch.changes.of_forces.data() + axis * rows, count}));
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);

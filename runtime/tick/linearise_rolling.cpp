@@ -13,7 +13,7 @@ namespace {
 /// What turns and what follows of the closed contacts and their tilt.
 void gather_contacts(const State& state, Scratch& scratch, Index number, double radius) noexcept {
   const ContactProblem& problem = scratch.problem;
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   for (Index k = 0; k < problem.contacts; ++k) {
     const bool is_tilt = k >= state.contact_count;
     const ContactPoint& contact = state.contact_points[is_tilt ? problem.owner[k] : k];
@@ -36,7 +36,7 @@ const double* response(const NearField& near, Scratch& scratch, const RollingScr
   for (std::size_t n = 0; n < 3; ++n) {
     if (turning.weights[n] == 1.0 && places[n] >= 0) return near.row(D * places[n] + axis).data();
   }
-  double* y = scratch.row_response.data();
+  double* y = scratch.assembly.row_response.data();
   const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
   std::fill_n(y, width, 0.0);
   for (std::size_t n = 0; n < 3; ++n) {
@@ -48,7 +48,7 @@ const double* response(const NearField& near, Scratch& scratch, const RollingScr
 /// Fills T and B.
 template <int D>
 void gather_response(const NearField& near, Scratch& scratch) noexcept {
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   const std::ptrdiff_t width = std::ptrdiff_t{D} * rolling.turning_count;
   for (std::ptrdiff_t j = 0; j < width; ++j) {
     const double* y = response<D>(near, scratch, rolling.turning[j / D], static_cast<int>(j % D));
@@ -137,7 +137,7 @@ VectorLanes turn_normals(RollingScratch& rolling, const VectorLanes& tool) noexc
 /// Motions along the rows: those of the device, and what the turning moves surface and tool by.
 template <int D>
 void add_motion_to_rows(Scratch& scratch, const VectorLanes& given_way, Index number) noexcept {
-  const RollingScratch& rolling = scratch.rolling;
+  const RollingScratch& rolling = scratch.changes.rolling;
   const std::ptrdiff_t width = std::ptrdiff_t{D} * rolling.turning_count;
   for (Index k = 0; k < rolling.following_count; ++k) {
     const Index i = rolling.following[k];
@@ -145,19 +145,19 @@ void add_motion_to_rows(Scratch& scratch, const VectorLanes& given_way, Index nu
     if (scratch.rows[i].tool == number) change += along(given_way, scratch.rows[i].force);
     const double* B = rolling.B.data() + k * width;
     for (std::ptrdiff_t j = 0; rolling.answers && j < width; ++j) change += B[j] * rolling.turning_force[j];
-    for (int s = 0; s < D; ++s) scratch.row_change[s * scratch.problem.rows + i] = change[s];
+    for (int s = 0; s < D; ++s) scratch.changes.of_rows[s * scratch.problem.rows + i] = change[s];
   }
 }
 
 /// Takes the change of the contact forces; its sum on the tool.
 template <int D>
 VectorLanes take_forces(Scratch& scratch, Index number) noexcept {
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   VectorLanes sum = zero();
   for (Index k = 0; k < rolling.following_count; ++k) {
     const Index i = rolling.following[k];
     Lanes by = Lanes::Zero();
-    for (int s = 0; s < D; ++s) by[s] = scratch.force_change[s * scratch.problem.rows + i];
+    for (int s = 0; s < D; ++s) by[s] = scratch.changes.of_forces[s * scratch.problem.rows + i];
     rolling.row_force[k] = by;
     if (scratch.rows[i].tool != number) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += scratch.rows[i].force[axis] * by;
@@ -175,19 +175,19 @@ void go_to_limit(const VectorLanes& step, const VectorLanes& last_step, VectorLa
 
 template <int D>
 void begin_changes(Scratch& scratch) noexcept {
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   for (Index k = 0; k < rolling.following_count; ++k) {
     rolling.row_force[k].setZero();
     rolling.device_change[k].setZero();
     for (int s = 0; s < D; ++s)
-      rolling.device_change[k][s] = scratch.row_change[s * scratch.problem.rows + rolling.following[k]];
+      rolling.device_change[k][s] = scratch.changes.of_rows[s * scratch.problem.rows + rolling.following[k]];
   }
   for (Index j = 0; j < D * rolling.turning_count; ++j) rolling.turning_force[j].setZero();
 }
 
 template <int D>
 VectorLanes change_by_rolling(Scratch& scratch, Index number, double coupling) noexcept {
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   const double tolerance = tuning.hand.rolling_tolerance * tuning.hand.rolling_tolerance;
   begin_changes<D>(scratch);
   VectorLanes change = zero();
@@ -212,7 +212,7 @@ VectorLanes change_by_rolling(Scratch& scratch, Index number, double coupling) n
 }  // namespace
 
 bool begin_rolling(const State& state, Scratch& scratch, Index number, double radius) noexcept {
-  RollingScratch& rolling = scratch.rolling;
+  RollingScratch& rolling = scratch.changes.rolling;
   rolling.turning_count = 0;
   rolling.following_count = 0;
   const auto contacts = state.contacts();

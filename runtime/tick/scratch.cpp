@@ -63,72 +63,89 @@ MergingScratch::MergingScratch(Index surface_nodes, Index groups, Index most_mem
       maps(weights.size(), Eigen::Matrix3d::Zero()),
       feature(size(groups), -1) {}
 
-Scratch::Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near)
-    : last_contacts(size(max_contacts)),
-      last_of_feature(places_of_features(max_contacts), -1),
-      found(body.surface_friction().size()),
-      found_distance(body.surface_friction().size()),
-      pairs(size(std::min(8 * max_contacts, static_cast<Index>(body.surface_friction().size())))),
-      candidates(size(3 * tools) * pairs.size()),
-      candidate_at_node(body.surface_rest_positions().size(), -1),
-      candidates_between(candidates.size()),
-      merging(static_cast<Index>(candidate_at_node.size()), body.aggregates().count(),
-              body.aggregates().most_members(), max_contacts),
-      left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
-      problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
-              most_rows(body, many(max_contacts))),
-      rows(size(most_rows(body, max_contacts))),
-      row_first(size(few_rows(body, max_contacts))),
-      row_body(row_first.size()),
-      row_response(size(body.dimension() * near.capacity())),
-      guess_force(row_response.size()),
-      upcoming(last_contacts.size()),
-      order(last_contacts.size()),
-      response(last_contacts.size()),
-      last_response(last_contacts.size()),
-      compliance(most_rows(body, many(max_contacts)), body.dimension() * near.capacity()),
-      coupling(size(6 * most_rows(body, many(max_contacts)))),
-      tilt_spring(rows.size()),
-      active_set(few_rows(body, max_contacts)),
-      cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
-      newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))),
-      imbalance(body.dimension() * max_contacts, most_rows(body, max_contacts)),
-      missing_force(size(tools), Vec3::Zero()),
-      left_out_nodes(most_sampled),
-      left_out_blocks(size(body.dimension() * body.dimension()) * most_sampled),
-      greens_error(body, near),
-      row_change(size(body.dimension()) * rows.size()),
-      force_change(row_change.size()),
-      rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),
-      far_displacement(size(body.dimension() * (tuning.far.nodes + tuning.far.run))) {}
+LastContacts::LastContacts(Index max_contacts)
+    : contacts(size(max_contacts)), of_feature_(places_of_features(max_contacts), -1) {}
 
-void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept {
-  const std::size_t mask = scratch.last_of_feature.size() - 1;
-  for (Index k = 0; k < scratch.last_count; ++k) {
-    std::size_t at = hash(scratch.last_contacts[size(k)].feature) & mask;
-    while (scratch.last_of_feature[at] != k) at = (at + 1) & mask;
-    scratch.last_of_feature[at] = -1;
+void LastContacts::remember(std::span<const ContactPoint> now) noexcept {
+  const std::size_t mask = of_feature_.size() - 1;
+  for (Index k = 0; k < count; ++k) {
+    std::size_t at = hash(contacts[size(k)].feature) & mask;
+    while (of_feature_[at] != k) at = (at + 1) & mask;
+    of_feature_[at] = -1;
   }
-  std::copy(contacts.begin(), contacts.end(), scratch.last_contacts.begin());
-  scratch.last_count = static_cast<Index>(contacts.size());
-  for (Index k = 0; k < scratch.last_count; ++k) enter_feature(scratch, k);
+  std::copy(now.begin(), now.end(), contacts.begin());
+  count = static_cast<Index>(now.size());
+  for (Index k = 0; k < count; ++k) enter(k);
 }
 
-void enter_feature(Scratch& scratch, Index number) noexcept {
-  const std::size_t mask = scratch.last_of_feature.size() - 1;
-  std::size_t at = hash(scratch.last_contacts[size(number)].feature) & mask;
-  while (scratch.last_of_feature[at] >= 0) at = (at + 1) & mask;
-  scratch.last_of_feature[at] = number;
+void LastContacts::enter(Index number) noexcept {
+  const std::size_t mask = of_feature_.size() - 1;
+  std::size_t at = hash(contacts[size(number)].feature) & mask;
+  while (of_feature_[at] >= 0) at = (at + 1) & mask;
+  of_feature_[at] = number;
 }
 
-Index last_number(const Scratch& scratch, std::int64_t feature) noexcept {
-  const std::size_t mask = scratch.last_of_feature.size() - 1;
+Index LastContacts::number_of(std::int64_t feature) const noexcept {
+  const std::size_t mask = of_feature_.size() - 1;
   std::size_t at = hash(feature) & mask;
   while (true) {
-    const Index k = scratch.last_of_feature[at];
-    if (k < 0 || scratch.last_contacts[size(k)].feature == feature) return k;
+    const Index k = of_feature_[at];
+    if (k < 0 || contacts[size(k)].feature == feature) return k;
     at = (at + 1) & mask;
   }
 }
+
+DetectionScratch::DetectionScratch(const Body& body, Index tools, Index max_contacts)
+    : found(body.surface_friction().size()),
+      found_distance(found.size()),
+      pairs(size(std::min(8 * max_contacts, static_cast<Index>(found.size())))),
+      candidates(size(3 * tools) * pairs.size()),
+      candidate_at_node(body.surface_rest_positions().size(), -1),
+      candidates_between(candidates.size()),
+      left_out(candidates.size() + std::min(most_simplices_left_out, found.size())) {}
+
+AssemblyScratch::AssemblyScratch(const Body& body, Index max_contacts, Index near_nodes)
+    : row_first(size(few_rows(body, max_contacts))),
+      row_body(row_first.size()),
+      row_response(size(body.dimension() * near_nodes)),
+      guess_force(row_response.size()),
+      upcoming(size(max_contacts)),
+      order(upcoming.size()),
+      response(upcoming.size()),
+      last_response(upcoming.size()),
+      compliance(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
+      coupling(size(6 * most_rows(body, many(max_contacts)))),
+      tilt_spring(size(most_rows(body, max_contacts))) {}
+
+SolverScratch::SolverScratch(const Body& body, Index max_contacts)
+    : active_set(few_rows(body, max_contacts)),
+      cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
+      newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))) {}
+
+ForceErrorScratch::ForceErrorScratch(const Body& body, Index tools, Index max_contacts)
+    : imbalance(body.dimension() * max_contacts, most_rows(body, max_contacts)),
+      missing_force(size(tools), Vec3::Zero()),
+      left_out_nodes(most_sampled),
+      left_out_blocks(size(body.dimension() * body.dimension()) * most_sampled) {}
+
+ChangeScratch::ChangeScratch(const Body& body, Index max_contacts)
+    : of_rows(size(body.dimension() * most_rows(body, max_contacts))),
+      of_forces(of_rows.size()),
+      rolling(body.dimension(), max_contacts, most_rows(body, max_contacts)) {}
+
+Scratch::Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near)
+    : last(max_contacts),
+      detection(body, tools, max_contacts),
+      merging(static_cast<Index>(detection.candidate_at_node.size()), body.aggregates().count(),
+              body.aggregates().most_members(), max_contacts),
+      problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
+              most_rows(body, many(max_contacts))),
+      rows(size(most_rows(body, max_contacts))),
+      assembly(body, max_contacts, near.capacity()),
+      solvers(body, max_contacts),
+      force_error(body, tools, max_contacts),
+      greens_error(body, near),
+      changes(body, max_contacts),
+      far_displacement(size(body.dimension() * (tuning.far.nodes + tuning.far.run))) {}
 
 }  // namespace palpate

@@ -26,21 +26,21 @@ struct HighWater {
   Index near_nodes = 0;      ///< of NearField::capacity
   Index contact_points = 0;  ///< of State::max_contacts
   Index unknowns = 0;        ///< rows of the contact problem, of Scratch::rows
-  Index simplices = 0;       ///< near a tool, of Scratch::pairs; more were there where it is larger
+  Index simplices = 0;       ///< near a tool, of DetectionScratch::pairs; more were there where it is larger
 };
 
 /// A contact point on its way into the contact problem.
 struct UpcomingContact {
-  Index last = -1;          ///< the same one in Scratch::last_contacts
+  Index last = -1;          ///< the same one in LastContacts
   bool stays_open = false;  ///< in this tick: it has no rows
-  bool has_place = false;   ///< in Scratch::order
+  bool has_place = false;   ///< in AssemblyScratch::order
   Vec3 motion =
       Vec3::Zero();  ///< of tool and surface against each other if no force changes, and the gap [m]
 };
 
 /// A group of surface nodes that were one contact point in the tick before.
 struct MergedGroup {
-  Index last = -1;      ///< in Scratch::last_contacts
+  Index last = -1;      ///< in LastContacts
   double defect = 0.0;  ///< how much its members' gaps differ from their mean at most [m]
 };
 
@@ -56,70 +56,113 @@ struct MergingScratch {
   bool has_changed = false;              ///< other nodes are merged than in the tick or pass before
 };
 
-/// What stages of a tick hand to each other. No tick needs it from the one before: only `high_water` goes on,
-/// the compliance and responses of many contacts, without which they are computed from nothing; the problem's
-/// forces may be read until the next tick. Sized at start. Each member: shape, who fills it.
+/// The contact points of the tick before (or the pass before), found by their features.
+class LastContacts {
+ public:
+  explicit LastContacts(Index max_contacts);
+
+  /// Keeps these.
+  void remember(std::span<const ContactPoint> now) noexcept;
+  /// Enters contacts[number] into the table of features; not for one that is in it.
+  void enter(Index number) noexcept;
+  /// Number of the contact with this feature, -1 where there was none.
+  [[nodiscard]] Index number_of(std::int64_t feature) const noexcept;
+
+  std::vector<ContactPoint> contacts;  ///< [max_contacts]
+  Index count = 0;
+
+ private:
+  std::vector<Index> of_feature_;  // [power of 2] their numbers, hashed by feature
+};
+
+/// For detection.
+struct DetectionScratch {
+  DetectionScratch(const Body& body, Index tools, Index max_contacts);
+
+  std::vector<Index> found;              ///< [F] simplices near a tool; free motion uses it too
+  std::vector<double> found_distance;    ///< [F] squared [m^2]
+  std::size_t found_count = 0;           ///< of `found`, within a tool's reach
+  std::vector<TouchingPair> pairs;       ///< [8 max_contacts]
+  std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] before they are merged, and the deepest
+                                         ///< chosen
+  Index candidate_count = 0;
+  Index simplex_ahead = -1;               ///< soon to be within a tool's reach; -1: none
+  std::vector<Index> candidate_at_node;   ///< [S] candidate at a surface node that was found last
+  std::vector<Index> candidates_between;  ///< [as candidates] those that are no surface node
+  Index between_count = 0;
+  std::vector<LeftOut> left_out;  ///< places for which there was no room
+  Index left_out_count = 0;
+};
+
+/// For assembly.
+struct AssemblyScratch {
+  AssemblyScratch(const Body& body, Index max_contacts, Index near_nodes);
+
+  std::vector<std::ptrdiff_t> row_first;        ///< [few rows] column of C of the one node of a row
+  std::vector<std::array<double, 4>> row_body;  ///< [few rows] what the row has of it
+  std::vector<double> row_response;             ///< [d near_nodes] a column of Xi J^T [m/N]
+  std::vector<double> guess_force;              ///< [d near_nodes] of many contacts [N]
+  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] of many contacts
+  std::vector<Index> order;                     ///< [max_contacts] of many contacts: who comes to each place
+  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] `linearise` of many contacts: change of the
+                                          ///< force by a motion of the tool's device, a column an axis [N/m]
+  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] of the tick or pass before
+  Index response_count = 0;
+  BodyCompliance compliance;        ///< of many contacts: the body's
+  std::vector<float> coupling;      ///< [6 x rows] of many contacts: forces and moments
+  std::vector<double> tilt_spring;  ///< [rows] of edges and faces [m/N]
+};
+
+/// The solvers, and how the last pass went.
+struct SolverScratch {
+  SolverScratch(const Body& body, Index max_contacts);
+
+  ActiveSet active_set;        ///< without friction
+  ConeSolver cone_solver;      ///< with friction
+  NewtonKrylov newton_krylov;  ///< of many contacts
+  bool is_solved = true;       ///< to its tolerance
+  bool was_improved = false;   ///< few contacts took a second solver
+};
+
+/// For the estimate of what a best effort may be off by.
+struct ForceErrorScratch {
+  ForceErrorScratch(const Body& body, Index tools, Index max_contacts);
+
+  Imbalance imbalance;                  ///< of a problem that was not solved
+  std::vector<Vec3> missing_force;      ///< [tools] of the solver [N]
+  std::vector<Index> left_out_nodes;    ///< [sampled] stored nodes
+  std::vector<double> left_out_blocks;  ///< [d x d sampled] Xi of these [m/N]
+};
+
+/// For the answer of the forces to motions.
+struct ChangeScratch {
+  ChangeScratch(const Body& body, Index max_contacts);
+
+  std::vector<double> of_rows;    ///< [d x rows] db, an axis after the other [m]
+  std::vector<double> of_forces;  ///< [d x rows] dlambda [N]
+  RollingScratch rolling;         ///< the turning of normals
+};
+
+/// What stages of a tick hand to each other, by who fills it. No tick needs it from the one before: only
+/// `high_water` goes on, the compliance and responses of many contacts, without which they are computed from
+/// nothing; the problem's forces may be read until the next tick. Sized at start.
 struct Scratch {
   /// Room for the tools' contacts: `max_contacts` of all tools together, and what fits into the near field.
   Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near);
 
-  std::vector<ContactPoint> last_contacts;  ///< [max_contacts] `remember`: of the tick or pass before
-  Index last_count = 0;
-  std::vector<Index> last_of_feature;    ///< [power of 2] `remember`: their numbers, hashed by feature
-  std::vector<Index> found;              ///< [F] detection, free motion: simplices near a tool
-  std::vector<double> found_distance;    ///< [F] detection: squared [m^2]
-  std::vector<TouchingPair> pairs;       ///< [8 max_contacts] detection
-  std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] detection: before they are merged, and
-                                         ///< the deepest chosen
-  Index candidate_count = 0;
-  Index simplex_ahead = -1;               ///< detection: soon to be within a tool's reach; -1: none
-  std::vector<Index> candidate_at_node;   ///< [S] detection: candidate at a surface node that was found last
-  std::vector<Index> candidates_between;  ///< [as candidates] detection: those that are no surface node
-  Index between_count = 0;
-  MergingScratch merging;         ///< merging
-  std::size_t found_count = 0;    ///< detection: of `found`, within a tool's reach
-  std::vector<LeftOut> left_out;  ///< detection: places for which there was no room
-  Index left_out_count = 0;
-  bool is_first_pass = true;              ///< solve_contact: of the tick's Newton passes
-  bool is_solved = true;                  ///< solution: to its tolerance, in the last pass
-  bool was_improved = false;              ///< solution: few contacts took a second solver, in the last pass
-  ContactProblem problem;                 ///< [rows] assembly: W and b; solution: lambda
-  std::vector<ContactRow> rows;           ///< [rows] assembly: J
-  std::vector<std::ptrdiff_t> row_first;  ///< [few rows] assembly: column of C of the one node of a row
-  std::vector<std::array<double, 4>> row_body;  ///< [few rows] assembly: what the row has of it
-  std::vector<double> row_response;             ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
-  std::vector<double> guess_force;              ///< [d near_nodes] assembly of many contacts [N]
-  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] assembly of many contacts
-  std::vector<Index> order;  ///< [max_contacts] assembly of many contacts: who comes to each place
-  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] linearise of many contacts: change of the force
-                                          ///< by a motion of the tool's device, a column an axis [N/m]
-  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] of the tick or pass before
-  Index response_count = 0;
-  BodyCompliance compliance;             ///< assembly of many contacts: the body's
-  std::vector<float> coupling;           ///< [6 x rows] assembly of many contacts: forces and moments
-  std::vector<double> tilt_spring;       ///< [rows] assembly: of edges and faces [m/N]
-  ActiveSet active_set;                  ///< solution without friction
-  ConeSolver cone_solver;                ///< solution with friction
-  NewtonKrylov newton_krylov;            ///< solution of many contacts
-  Imbalance imbalance;                   ///< force error: of a problem that was not solved
-  std::vector<Vec3> missing_force;       ///< [tools] force error: of the solver [N]
-  std::vector<Index> left_out_nodes;     ///< [sampled] force error: stored nodes
-  std::vector<double> left_out_blocks;   ///< [d x d sampled] force error: Xi of these [m/N]
+  LastContacts last;
+  DetectionScratch detection;
+  MergingScratch merging;
+  bool is_first_pass = true;     ///< solve_contact: of the tick's Newton passes
+  ContactProblem problem;        ///< [rows] assembly: W and b; solution: lambda
+  std::vector<ContactRow> rows;  ///< [rows] assembly: J
+  AssemblyScratch assembly;
+  SolverScratch solvers;
+  ForceErrorScratch force_error;
   GreensErrorScratch greens_error;       ///< linearise: of compressed Green's functions
-  std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
-  std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
-  RollingScratch rolling;                ///< linearise: the turning of normals
+  ChangeScratch changes;                 ///< linearise
   std::vector<double> far_displacement;  ///< [d nodes] far surface: what is renewed in a tick [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };
-
-/// Keeps contact points as those of the tick (or pass) before.
-void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept;
-
-/// Enters scratch.last_contacts[number] into the table of features; not for one that is in it.
-void enter_feature(Scratch& scratch, Index number) noexcept;
-
-/// Number of the contact of the tick before with this feature, -1 where there was none.
-[[nodiscard]] Index last_number(const Scratch& scratch, std::int64_t feature) noexcept;
 
 }  // namespace palpate

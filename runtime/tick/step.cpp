@@ -32,10 +32,10 @@ void begin_tick(State& state) noexcept {
   }
 }
 
-void follow_devices(const Body& body, State& state, Scratch& scratch,
+void follow_devices(const Body& body, State& state, DetectionScratch& detection,
                     std::span<const ToolPose> poses) noexcept {
   for (std::size_t k = 0; k < state.tools.size(); ++k)
-    follow_device(body, state.surface.tree, scratch, state.tools[k], poses[k]);
+    follow_device(body, state.surface.tree, detection, state.tools[k], poses[k]);
   state.surface.near.begin_tick();
 }
 
@@ -96,10 +96,10 @@ StepStatus end_tick(State& state) noexcept {
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept {
   Scratch& scratch = state.scratch;
   begin_tick(state);
-  follow_free_motion(body, state, scratch);
-  follow_devices(body, state, scratch, poses);
-  remember(state.contacts(), scratch);
-  update_holds(body, state, scratch);
+  follow_free_motion(body, state, scratch.detection);
+  follow_devices(body, state, scratch.detection, poses);
+  scratch.last.remember(state.contacts());
+  update_holds(body, state, scratch.last);
   count_still_ticks(state);
   const ContactOutcome contact = solve_contact(body, state, scratch);
   if (contact == ContactOutcome::solved) {
@@ -113,8 +113,8 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   }
   release(body, state);
   renew_stored_displacement(body, state.surface);
-  renew_far_surface(body, state.surface, scratch, state.ticks);
-  renew_patch_surface(body, state.surface, scratch);
+  renew_far_surface(body, state.surface, scratch.far_displacement, state.ticks);
+  renew_patch_surface(body, state.surface, scratch.far_displacement);
   state.surface.tree.refit();
   return end_tick(state);
 }

@@ -34,14 +34,13 @@ Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index no
 }
 
 /// What the near field's load moves ranges of stored nodes by.
-void displace_ranges(const Body& body, const SurfaceState& surface, Scratch& scratch,
+void displace_ranges(const Body& body, const SurfaceState& surface, std::span<double> room,
                      std::span<const NodeRange> ranges) noexcept {
   std::size_t nodes = 0;
   for (const NodeRange& range : ranges) nodes += static_cast<std::size_t>(range.end - range.first);
   const SurfaceLoad& load = surface.near.load();
-  load.greens(body).displacement(
-      load.nodes(), load.forces(), ranges,
-      std::span(scratch.far_displacement).first(static_cast<std::size_t>(body.dimension()) * nodes));
+  load.greens(body).displacement(load.nodes(), load.forces(), ranges,
+                                 room.first(static_cast<std::size_t>(body.dimension()) * nodes));
 }
 
 /// Renews the displacement of stored nodes [first, end) to u, and moves the surface nodes that follow them
@@ -83,7 +82,7 @@ void find_near_runs(const Body& body, const NearField& near, FarSweep& sweep) no
 }
 
 /// Renews `most` nodes of the near runs, which take turns, each once at most. False where there are none.
-bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
+bool renew_near_runs(const Body& body, SurfaceState& surface, std::span<double> room, Index most) noexcept {
   const NodeRuns& runs = body.runs();
   FarSweep& sweep = surface.sweep;
   if (sweep.next_near_run >= sweep.near_run_count) {
@@ -99,9 +98,9 @@ bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, 
     ranges[count++] = {begin, end};
     left -= end - begin;
   }
-  displace_ranges(body, surface, scratch, std::span(ranges).first(count));
+  displace_ranges(body, surface, room, std::span(ranges).first(count));
   Index moves = tuning.far.moves;
-  const double* u = scratch.far_displacement.data();
+  const double* u = room.data();
   for (std::size_t k = 0; k < count && moves > 0; ++k) {
     const auto [begin, end] = ranges[k];
     const Index run = sweep.near_runs[sweep.next_near_run];
@@ -116,15 +115,14 @@ bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, 
 }
 
 /// Renews the next `most` nodes of the whole body.
-void renew_all_in_turn(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
+void renew_all_in_turn(const Body& body, SurfaceState& surface, std::span<double> room, Index most) noexcept {
   FarSweep& sweep = surface.sweep;
   const Index nodes = body.greens().nodes();
   Index moves = tuning.far.moves;
   const Index end = std::min(sweep.next_node + most, nodes);
   const NodeRange range{sweep.next_node, end};
-  displace_ranges(body, surface, scratch, {&range, 1});
-  sweep.next_node =
-      renew_nodes(body, surface, scratch.far_displacement.data(), sweep.next_node, end, moves) % nodes;
+  displace_ranges(body, surface, room, {&range, 1});
+  sweep.next_node = renew_nodes(body, surface, room.data(), sweep.next_node, end, moves) % nodes;
   if (sweep.next_node != 0) return;
   sweep.last_change = sweep.change;
   sweep.change = 0.0;
@@ -154,7 +152,7 @@ void move_near_surface(const Body& body, SurfaceState& surface) noexcept {
   surface.tree.refit();
 }
 
-void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexcept {
+void follow_free_motion(const Body& body, State& state, DetectionScratch& detection) noexcept {
   SurfaceState& surface = state.surface;
   surface.motion.begin_tick(body);
   if (!surface.motion.active()) return;
@@ -169,9 +167,9 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
     const double reach =
         tool.tool.radius + tool.margin + 2.0 * std::max(surface.sweep.last_change, surface.sweep.change);
     const std::size_t found =
-        std::min(near_core(surface.tree, core, reach, scratch.found), scratch.pairs.size());
+        std::min(near_core(surface.tree, core, reach, detection.found), detection.pairs.size());
     for (std::size_t k = 0; k < found; ++k) {
-      for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(scratch.found[k]), d)) {
+      for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(detection.found[k]), d)) {
         if (body.surface_moves(node)) move_far(body, surface, node, stored_displacement(body, surface, node));
       }
     }
@@ -188,24 +186,23 @@ void renew_stored_displacement(const Body& body, SurfaceState& surface) noexcept
   }
 }
 
-void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch,
+void renew_far_surface(const Body& body, SurfaceState& surface, std::span<double> room,
                        std::int64_t tick) noexcept {
   const Index most =
       std::min(tuning.far.nodes, tuning.far.blocks / std::max<Index>(surface.near.load().count, 1) + 1);
   const bool is_turn_of_near = tick % tuning.far.all_stride != 0;
-  if (is_turn_of_near && renew_near_runs(body, surface, scratch, most)) return;
-  renew_all_in_turn(body, surface, scratch, most);
+  if (is_turn_of_near && renew_near_runs(body, surface, room, most)) return;
+  renew_all_in_turn(body, surface, room, most);
 }
 
-void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept {
+void renew_patch_surface(const Body& body, SurfaceState& surface, std::span<double> room) noexcept {
   if (surface.near.patch() == nullptr) return;
   const std::span<const Index> nodes = surface.near.patch()->surface_nodes();
   const auto count = static_cast<Index>(nodes.size());
   surface.sweep.next_patch_node %= count;
   const Index end = std::min(surface.sweep.next_patch_node + tuning.far.patch_nodes, count);
   const std::span<double> u(
-      scratch.far_displacement.data(),
-      static_cast<std::size_t>(body.dimension() * (end - surface.sweep.next_patch_node)));
+      room.data(), static_cast<std::size_t>(body.dimension() * (end - surface.sweep.next_patch_node)));
   patch_displacement(surface.near.load(), surface.sweep.next_patch_node, u);
   for (Index k = surface.sweep.next_patch_node; k < end; ++k)
     move_far(body, surface, nodes[k], vector_at(u, body.dimension(), k - surface.sweep.next_patch_node));

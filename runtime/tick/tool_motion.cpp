@@ -48,7 +48,7 @@ bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
 
 }  // namespace
 
-void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
+void follow_device(const Body& body, const SurfaceTree& tree, DetectionScratch& detection, ToolState& tool,
                    ToolPose wanted) noexcept {
   tool.last_motion = tool.device.position - tool.last_device.position;
   tool.last_device = tool.device;
@@ -68,8 +68,8 @@ void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, 
   const bool caught = tool.contacts > 0 && has_gone_away(body, tool);
   if (!tool.placed || (!tool.engaged && !tool.holding) || caught) {
     place();
-    tool.engaged = tool.has_been_clear ? is_outside(body, tree, scratch, tool.tool, wanted)
-                                       : is_clear(body, tree, scratch, tool.tool, wanted);
+    tool.engaged = tool.has_been_clear ? is_outside(body, tree, detection, tool.tool, wanted)
+                                       : is_clear(body, tree, detection, tool.tool, wanted);
     tool.has_been_clear = tool.has_been_clear || tool.engaged;
     if (!tool.engaged) tool.status |= StepStatus::inside_body;
     return;

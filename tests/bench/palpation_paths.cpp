@@ -120,7 +120,7 @@ void turn_device(std::vector<ToolPose>& poses, double speed, std::uint64_t seed)
 std::optional<double> touch(const Body& body, State& rest, const Vec3& from, const Vec3& inward,
                             double most) {
   const auto clear = [&](double way) {
-    return is_clear(body, rest.surface.tree, rest.scratch, rest.tools.front().tool,
+    return is_clear(body, rest.surface.tree, rest.scratch.detection, rest.tools.front().tool,
                     {.position = from + way * inward});
   };
   if (!clear(0.0)) return std::nullopt;

@@ -25,7 +25,7 @@ TickStages time_stages(const Body& body, State& state, const ToolPose& pose) {
   tool.margin = 0.1 * body.mean_surface_edge() + (pose.position - tool.device.position).norm();
   tool.device = pose;
   state.surface.near.begin_tick();
-  remember(state.contacts(), scratch);
+  scratch.last.remember(state.contacts());
 
   TickStages stages;
   stages.find = seconds([&] { find_contacts(body, state, scratch); });

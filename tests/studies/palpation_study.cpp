@@ -139,9 +139,9 @@ Index new_nodes(const State& before, const State& after) {
 /// Whether more than one pass was made: then the contacts that the last pass began with are not those that
 /// the tick began with.
 bool more_passes(const State& before, const State& after) {
-  if (after.scratch.last_count != before.contact_count) return true;
-  for (Index k = 0; k < after.scratch.last_count; ++k) {
-    const ContactPoint& last = after.scratch.last_contacts[static_cast<std::size_t>(k)];
+  if (after.scratch.last.count != before.contact_count) return true;
+  for (Index k = 0; k < after.scratch.last.count; ++k) {
+    const ContactPoint& last = after.scratch.last.contacts[static_cast<std::size_t>(k)];
     const ContactPoint& first = before.contact_points[static_cast<std::size_t>(k)];
     if (last.feature != first.feature || last.position != first.position) return true;
   }
@@ -165,8 +165,8 @@ TickStudy take_apart(const Body& body, const State& before, const ToolPose& pose
   study.rows = state.scratch.problem.rows;
   study.near = state.surface.near.count();
   study.new_nodes = new_nodes(before, state);
-  study.rounds = state.scratch.problem.frictionless ? state.scratch.active_set.rounds()
-                                                    : state.scratch.cone_solver.rounds();
+  study.rounds = state.scratch.problem.frictionless ? state.scratch.solvers.active_set.rounds()
+                                                    : state.scratch.solvers.cone_solver.rounds();
   study.more_passes = more_passes(before, state);
   study.status = state.status;
   state = before;

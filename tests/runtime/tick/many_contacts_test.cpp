@@ -230,12 +230,12 @@ TEST_P(ManyContacts, KeepWhatDoesNotChange) {
     largest = std::max(largest, state.tools.front().contact_wrench.force.norm());
     if (!scratch.problem.many) continue;
     if (tick > 150)
-      shares.push_back(static_cast<double>(scratch.compliance.renewed()) /
+      shares.push_back(static_cast<double>(scratch.assembly.compliance.renewed()) /
                        static_cast<double>(scratch.problem.rows));
     if (!anew) continue;
-    anew->scratch.compliance.forget();
+    anew->scratch.assembly.compliance.forget();
     step(body, *anew, to);
-    ASSERT_EQ(anew->scratch.compliance.renewed(), anew->scratch.problem.rows) << tick;
+    ASSERT_EQ(anew->scratch.assembly.compliance.renewed(), anew->scratch.problem.rows) << tick;
     for (std::size_t k = 0; k < state.tools.size(); ++k) {
       ASSERT_EQ(state.tools[k].contact_wrench.force, anew->tools[k].contact_wrench.force) << tick;
       ASSERT_EQ(state.tools[k].local.stiffness, anew->tools[k].local.stiffness) << tick;
@@ -280,7 +280,7 @@ std::pair<Index, bool> slide_far(double radius) {
   step(cube(), state, pose(pressed + Vec3(0.1, 0.0, -0.02)));
   EXPECT_TRUE(state.scratch.problem.many);
   const auto last =
-      std::span(state.scratch.last_contacts).first(static_cast<std::size_t>(state.scratch.last_count));
+      std::span(state.scratch.last.contacts).first(static_cast<std::size_t>(state.scratch.last.count));
   const bool same = std::equal(before.begin(), before.end(), last.begin(), last.end(),
                                [](const ContactPoint& a, const ContactPoint& b) {
                                  return a.feature == b.feature && a.position == b.position;
@@ -304,13 +304,13 @@ TEST(Remember, FindsContactsByTheirFeature) {
   for (std::size_t k = 0; k < contacts.size(); ++k)
     contacts[k].feature =
         k < 50 ? static_cast<std::int64_t>(random() >> 1U) : static_cast<std::int64_t>(k) << 40U;
-  remember(contacts, state.scratch);
+  state.scratch.last.remember(contacts);
   for (std::size_t k = 0; k < contacts.size(); ++k)
-    EXPECT_EQ(last_number(state.scratch, contacts[k].feature), static_cast<Index>(k));
-  EXPECT_EQ(last_number(state.scratch, 12345), -1);
-  remember(std::span(contacts).first(30), state.scratch);
-  EXPECT_EQ(last_number(state.scratch, contacts[29].feature), 29);
-  EXPECT_EQ(last_number(state.scratch, contacts[30].feature), -1) << "nothing older is left";
+    EXPECT_EQ(state.scratch.last.number_of(contacts[k].feature), static_cast<Index>(k));
+  EXPECT_EQ(state.scratch.last.number_of(12345), -1);
+  state.scratch.last.remember(std::span(contacts).first(30));
+  EXPECT_EQ(state.scratch.last.number_of(contacts[29].feature), 29);
+  EXPECT_EQ(state.scratch.last.number_of(contacts[30].feature), -1) << "nothing older is left";
 }
 
 }  // namespace
