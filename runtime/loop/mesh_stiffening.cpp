@@ -14,9 +14,13 @@ double factor_of(ElementType element) noexcept {
       return 0.98;
     case ElementType::hex8:
       return 0.78;
-    default:
-      return 0.0;
+    case ElementType::line2:
+    case ElementType::tri3:
+    case ElementType::tri6:
+    case ElementType::quad4:
+      break;  // in the plane, or no body's
   }
+  return 0.0;
 }
 
 }  // namespace
