@@ -269,12 +269,6 @@ class Merging {
   Index merged_count_ = 0;
 };
 
-/// Lists the contacts of the tick before anew, as features have changed.
-void list_features(LastContacts& remembered) noexcept {
-  std::fill(last.of_feature.begin(), last.of_feature.end(), none);
-  for (Index k = 0; k < remembered.count; ++k) remembered.enter(k);
-}
-
 /// Shares a group's force out among its nodes. Where there is no room for all, some begin without.
 void part_last(const Body& body, const NearField& near, Scratch& scratch, Index number) noexcept {
   const ContactPoint group = scratch.last.contacts[number];
@@ -354,13 +348,13 @@ void hand_over_merged(const Body& body, const State& state, Scratch& scratch) no
     part_last(body, near, scratch, k);
     merging.has_changed = true;
   }
-  if (merging.has_changed) list_features(scratch.last);
+  if (merging.has_changed) scratch.last.list_features();
   for (const ContactPoint& contact : state.contacts()) {
     if (!is_group(contact)) continue;
     merging.feature[contact.aggregate] = none;
     if (scratch.last.number_of(contact.feature) != none) continue;
     if (!merge_last(body, near, scratch, contact)) continue;
-    list_features(scratch.last);
+    scratch.last.list_features();
     merging.has_changed = true;
   }
 }

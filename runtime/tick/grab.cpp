@@ -80,7 +80,7 @@ void end_hold(State& state, Index number) noexcept {
 void update_holds(const Body& body, State& state, const LastContacts& remembered) noexcept {
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     const ToolState& tool = state.tools[k];
-    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, last, k);
+    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, remembered, k);
     if (!tool.device.grab && tool.holding) end_hold(state, k);
   }
 }

@@ -85,6 +85,11 @@ void LastContacts::enter(Index number) noexcept {
   of_feature_[at] = number;
 }
 
+void LastContacts::list_features() noexcept {
+  std::fill(of_feature_.begin(), of_feature_.end(), -1);
+  for (Index k = 0; k < count; ++k) enter(k);
+}
+
 Index LastContacts::number_of(std::int64_t feature) const noexcept {
   const std::size_t mask = of_feature_.size() - 1;
   std::size_t at = hash(feature) & mask;

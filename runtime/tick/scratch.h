@@ -63,8 +63,8 @@ class LastContacts {
 
   /// Keeps these.
   void remember(std::span<const ContactPoint> now) noexcept;
-  /// Enters contacts[number] into the table of features; not for one that is in it.
-  void enter(Index number) noexcept;
+  /// Lists all anew, as features have changed.
+  void list_features() noexcept;
   /// Number of the contact with this feature, -1 where there was none.
   [[nodiscard]] Index number_of(std::int64_t feature) const noexcept;
 
@@ -72,6 +72,8 @@ class LastContacts {
   Index count = 0;
 
  private:
+  void enter(Index number) noexcept;
+
   std::vector<Index> of_feature_;  // [power of 2] their numbers, hashed by feature
 };
 
