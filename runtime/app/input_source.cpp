@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/private_file.h"
 #include "base/program.h"
 #include "runtime/app/script_device.h"
 #include "runtime/devices/bridge/bridge_port.h"
@@ -84,8 +85,11 @@ Settings settle_mouse(Settings settings, const Body& body) {
 std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice, const SafetyOptions& safety,
                                       Guardian* guardian) {
   if (choice.kind == DeviceChoice::Kind::bridge) {
-    return std::make_unique<BridgePort>(BridgeOptions{
-        .listen = parse_bridge_address(choice.text), .max_force = safety.max_force, .stale = safety.stale});
+    return std::make_unique<BridgePort>(BridgeOptions{.socket = choice.target.empty()
+                                                                    ? private_file("bridge.socket")
+                                                                    : std::filesystem::path(choice.target),
+                                                      .max_force = safety.max_force,
+                                                      .stale = safety.stale});
   }
   std::vector<NamedProfile> profiles = known_profiles();
   if (!choice.profile.empty()) profiles = {find_profile(choice.profile)};

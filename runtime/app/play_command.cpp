@@ -43,7 +43,7 @@ void add_input(CLI::App& play, PlayArguments& arguments) {
                   "what moves the tool: a CSV with the columns t,x,y,z[,qw,qx,qy,qz][,grab] (s, m, "
                   "quaternion, 0 or 1); a recording; a HID device (palpate-runtime devices lists them); "
                   "another process; or, with --view, the pointer in the browser, which is then the default")
-      ->type_name("script:TOUCH.csv|replay:SESSION.mcap|hid[:WHICH]|bridge[:[ADDRESS:]PORT]|mouse")
+      ->type_name("script:TOUCH.csv|replay:SESSION.mcap|hid[:WHICH]|bridge[:SOCKET]|mouse")
       ->group(input_group);
   play.add_option("--profile", arguments.profile,
                   "profile of the HID device if its ids do not tell: a built-in name or a file")
@@ -159,7 +159,7 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
   throw CLI::ValidationError("--device",
                              "'" + text +
                                  "' is none of script:FILE.csv, replay:SESSION.mcap, hid[:WHICH], "
-                                 "bridge[:[ADDRESS:]PORT] and, with --view, mouse");
+                                 "bridge[:SOCKET] and, with --view, mouse");
 }
 
 /// What shows it, and what moves the tool then.

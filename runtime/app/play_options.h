@@ -19,7 +19,7 @@ struct DeviceChoice {
     script,  ///< a CSV file: `target`
     replay,  ///< a session
     hid,     ///< a HID device: `target` says which, empty where there is only one; `profile` how to treat it
-    bridge,  ///< another process, at the address `target`
+    bridge,  ///< another process, at the socket `target`; empty: at the usual one
     mouse,   ///< the pointer of a viewer
   };
   Kind kind = Kind::script;

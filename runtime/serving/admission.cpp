@@ -3,16 +3,17 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/random.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <optional>
 #include <system_error>
-#include <vector>
 
-#include "base/random_bytes.h"
-#include "runtime/devices/bridge/bridge_seal.h"
+#include "base/error.h"
+#include "runtime/serving/sha256.h"
 
 namespace palpate {
 namespace {
@@ -78,7 +79,12 @@ bool is_own_page(std::string_view origin, std::string_view host) {
 }
 
 std::string random_token() {
-  return fmt::format("{:02x}", fmt::join(random_bytes<16>(), ""));
+  std::array<std::uint8_t, 16> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != std::ssize(bytes)) {
+    throw Error("no random numbers: " + std::system_category().message(errno), "getrandom",
+                "see why the kernel has none");
+  }
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 bool is_token(std::string_view text) noexcept {
@@ -87,11 +93,7 @@ bool is_token(std::string_view text) noexcept {
 }
 
 std::string proof_of(const std::string& token, std::string_view nonce) {
-  const std::string both = token + std::string(nonce);
-  const std::vector<std::uint8_t> bytes(both.begin(), both.end());
-  std::array<std::uint8_t, BRIDGE_HASH_BYTES> hash{};
-  bridge_hash(bytes.data(), bytes.size(), hash.data());
-  return fmt::format("{:02x}", fmt::join(hash, ""));
+  return fmt::format("{:02x}", fmt::join(sha256(token + std::string(nonce)), ""));
 }
 
 bool is_same_token(std::string_view given, std::string_view token) noexcept {

@@ -7,8 +7,8 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "base/private_file.h"
 #include "base/program.h"
-#include "runtime/devices/bridge/secret_file.h"
 #include "runtime/serving/admission.h"
 
 namespace palpate {
@@ -32,11 +32,11 @@ std::string token_of(const ViewerOptions& options) {
   }
   std::string token = random_token();
   try {
-    const std::filesystem::path file = secret_file(fmt::format("viewer-{}.token", options.port));
-    const std::string kept = read_secret(file);
+    const std::filesystem::path file = private_file(fmt::format("viewer-{}.token", options.port));
+    const std::string kept = read_private_file(file);
     const std::string before = kept.substr(0, token.size());
     if (is_token(before) && kept == before + "\n" + shows) return before;
-    write_secret(file, token + "\n" + shows);
+    write_private_file(file, token + "\n" + shows);
   } catch (const Error&) {  // there is no folder for it: the next run has another one
   }
   return token;

@@ -228,12 +228,11 @@ test('overlays are offered as far as the file has layers', async (t) => {
 test('with a hand in the device its faults and its safety are not the page\'s', async (t) => {
   const at = await folder(t);
   const file = await bake(at, cube(4));
-  const port = 20000 + (process.pid % 20000);
-  const keys = { ...process.env, XDG_RUNTIME_DIR: at };
-  const bridge = spawn(example, ['--port', String(port), '--seconds', '600', '--from', '0,0,0.1', '--to', '0,0,0.1'], { env: keys, stdio: 'ignore' });
+  const name = path.join(at, 'bridge.socket');
+  const bridge = spawn(example, ['--socket', name, '--seconds', '600', '--from', '0,0,0.1', '--to', '0,0,0.1'], { stdio: 'ignore' });
   t.after(() => bridge.kill('SIGKILL'));
   const safety = 'late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4';
-  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--device', `bridge:${port}`, '--safety', safety], at, { env: keys });
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--device', `bridge:${name}`, '--safety', safety], at);
   const page = await ready(await visit(t, served.url));
   assert.equal((await told(page, 'state')).hand, true);
   assert.ok(await part(page, 'hand-note').isVisible());

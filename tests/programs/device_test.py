@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import pathlib
 import signal
 import socket
@@ -11,10 +12,10 @@ import tempfile
 import threading
 import time
 import unittest
+from unittest import mock
 
 import numpy
 
-from bridge_key import key_file, read_key, seal
 from programs import BINARY, PATIENCE, RUNTIME, ProgramTest, cube_toml, done, palpate, recorded, run
 
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
@@ -26,50 +27,61 @@ CALM = "late=10,most_late=1e9,stale_life=10,silence=30,silence_fade=20,frozen=10
 PATIENT = CALM + ",max_speed=1000"
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+def bridge_socket():
+    return socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
 class Hand(threading.Thread):
     """A device of the test's own behind the bridge. Its way is by what it hears, not by a clock: `move(hand)` gives the height [m] that it says next."""
 
-    STATE = struct.Struct("<4sHHQIIQ3d3d4f f 5f 8x")
+    STATE = struct.Struct("<4sIIIQ3d3d4ff5f")
 
-    def __init__(self, port, move):
+    def __init__(self, name, move):
         super().__init__(daemon=True)
-        self.port = port
+        self.name = name
         self.move = move
         self.height = 0.0
         self.force = 0.0  # along z, of the last word [N]
         self.heard = 0  # words
+        self.said = 0
         self.last = b""
         self.is_over = False
         self.start()
 
     def run(self):
-        while not key_file(self.port).exists() and not self.is_over:
+        while not self.is_over:
+            with contextlib.suppress(FileNotFoundError, ConnectionRefusedError), bridge_socket() as wire:  # there is no runtime, or not yet
+                wire.connect(str(self.name))
+                wire.settimeout(0.05)
+                while not self.is_over and self.hear(wire):
+                    self.say(wire)
+                wire.setblocking(False)
+                while self.hear(wire):
+                    pass
             time.sleep(0.01)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
-            wire.settimeout(0.05)
-            said = nonce = 0
-            while not self.is_over:
-                self.height = self.move(self)
-                said += 1
-                tremor = 1e-6 * (said % 5)
-                with contextlib.suppress(OSError):  # the runtime has ended, or is silent; a key that is just written has not all its letters
-                    state = self.STATE.pack(b"PLPS", 2, 128, nonce, said, 1 << 16, time.monotonic_ns(), 0, 0, self.height + tremor, 0, 0, 0,
-                                            1, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-                    wire.sendto(seal(read_key(self.port), state), ("127.0.0.1", self.port))
-                    self.last = wire.recv(256)
-                    nonce = struct.unpack_from("<Q", self.last, 8)[0]
-                    self.force = struct.unpack_from("<d", self.last, 56)[0]
-                    self.heard += 1
-            wire.setblocking(False)
-            with contextlib.suppress(OSError):
-                while True:
-                    self.last = wire.recv(256)
+
+    def say(self, wire):
+        self.height = self.move(self)
+        self.said += 1
+        tremor = 1e-6 * (self.said % 5)
+        with contextlib.suppress(OSError):  # the runtime has ended: what it said last is still to be heard
+            wire.send(self.STATE.pack(b"PLPS", 3, self.said, 1 << 16, time.monotonic_ns(), 0, 0, self.height + tremor, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0))
+
+    def hear(self, wire):
+        """The next word; false where there is no more."""
+        try:
+            word = wire.recv(256)
+        except TimeoutError:
+            return True  # it is silent: it may wait for us
+        except ConnectionResetError:
+            return True  # said once
+        except BlockingIOError:
+            return False
+        if word:
+            self.last = word
+            self.force = struct.unpack_from("<d", word, 40)[0]
+            self.heard += 1
+        return bool(word)
 
     def end(self):
         self.is_over = True
@@ -87,7 +99,7 @@ class Felt(ProgramTest):
     def setUp(self):
         super().setUp()
         self.file = self.bake(SMALL_CUBE)
-        self.port = free_port()
+        self.name = self.folder / "bridge.socket"
 
     def start(self, program, *arguments):
         messages = tempfile.NamedTemporaryFile("w+", dir=self.folder, suffix=".txt")
@@ -102,15 +114,15 @@ class Felt(ProgramTest):
         return process
 
     def play(self, *arguments):
-        return self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--tool", "sphere:0.01", "--origin",
+        return self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.name}", "--tool", "sphere:0.01", "--origin",
                           "0.05,0.05,0.12", "--safety", PATIENT, "--record", "session.mcap", "--report", "report.json", *arguments)
 
     def hand(self, seconds, depth, period=0.0, start=0.0):
-        return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
+        return self.start(BRIDGE, "--socket", self.name, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
                           f"0,0,{-depth}", "--period", period)
 
     def own_hand(self, move):
-        hand = Hand(self.port, move)
+        hand = Hand(self.name, move)
         self.addCleanup(hand.end)
         return hand
 
@@ -141,7 +153,7 @@ class Felt(ProgramTest):
         self.wait_for(lambda: hand.still > 500, runtime)
         runtime.send_signal(signal.SIGINT)
         messages = self.finish(runtime, 130)
-        self.assertIn(f"device: bridge:127.0.0.1:{self.port}", messages)
+        self.assertIn(f"device: bridge:{self.name}", messages)
         report = json.loads((self.folder / "report.json").read_text())
         self.assertGreater(report["ticks_in_contact"], 500)
         self.assertEqual(sum(report["safety"]["faults"].values()), 0)
@@ -218,7 +230,7 @@ class Felt(ProgramTest):
         self.fault_is_acknowledged(lambda runtime: runtime.send_signal(signal.SIGUSR1))
 
     def fault_is_acknowledged(self, acknowledge):
-        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.name}", "--origin", "0.05,0.05,0.12", "--safety",
                              CALM + ",max_speed=0.1", "--record", "session.mcap", "--report", "report.json")
         # In free space to and fro by 5 cm, until that was too fast; then it rests.
         hand = self.own_hand(lambda hand: 0.15 + 0.05 * (hand.heard % 2))
@@ -244,17 +256,18 @@ class Felt(ProgramTest):
         self.assertGreater(len(ended), 0)
         self.assertTrue((event[ended] & 4 != 0).all(), "nothing else ends it")
 
-    def test_datagrams_that_are_not_taken_are_told(self):
+    def test_messages_that_are_not_taken_are_told(self):
         runtime = self.play("--duration", "0.2")
         self.wait_for(lambda: "waiting for bridge:" in runtime.messages.read_text(), runtime)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:
+        with bridge_socket() as hand:
+            hand.connect(str(self.name))
             for _ in range(5):
-                hand.sendto(b"nonsense", ("127.0.0.1", self.port))
+                hand.send(b"nonsense")
         self.own_hand(down_to(0.01))
         messages = self.finish(runtime)
-        self.assertIn("refused of the device: 5 datagrams by magic", messages)
+        self.assertIn("refused of the device: 5 messages by version", messages)
         report = json.loads((self.folder / "report.json").read_text())
-        self.assertRegex(report["device"]["refused"], "^5 datagrams by magic")  # on a busy machine some by their age, too
+        self.assertRegex(report["device"]["refused"], "^5 messages by version")  # on a busy machine some by their age, too
 
     def test_signals_leave_no_force_and_a_whole_session(self):
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -265,14 +278,15 @@ class Felt(ProgramTest):
                 runtime.send_signal(stop)
                 self.finish(runtime, 130)
                 hand.end()
-                self.assertEqual(struct.unpack_from("<I", hand.last, 32)[0], 0, "the last word is no force")
+                self.assertEqual(struct.unpack_from("<I", hand.last, 12)[0], 0, "the last word is no force")
                 self.assertGreater(len(palpate.read(self.folder / "session.mcap")["time"]), 100)
 
-    def test_the_example_finds_the_body_by_itself(self):
+    def test_the_example_finds_runtime_and_body_by_itself(self):
         """docs/devices.md's two commands: without --to the hand goes down until it feels something."""
-        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--record", "session.mcap",
-                             "--report", "report.json")
-        hand = self.start(BRIDGE, "--port", self.port, "--rate", 2000, "--seconds", 600)
+        with mock.patch.dict(os.environ, XDG_RUNTIME_DIR=str(self.folder)):
+            runtime = self.start(RUNTIME, "play", self.file, "--device", "bridge", "--safety", PATIENT, "--record", "session.mcap",
+                                 "--report", "report.json")
+            hand = self.start(BRIDGE, "--rate", 2000, "--seconds", 600)
         self.wait_for(lambda: (self.shown() > 0.3).sum() > 100, runtime)
         runtime.send_signal(signal.SIGINT)
         messages = self.finish(runtime, 130)
@@ -286,30 +300,21 @@ class Felt(ProgramTest):
         self.assertNotIn("no force was ever felt", said)
 
     def test_who_never_touches_is_told(self):
-        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--duration", "0.5",
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.name}", "--safety", PATIENT, "--duration", "0.5",
                              "--report", "report.json")
-        hand = self.start(BRIDGE, "--port", self.port, "--seconds", 60, "--to", "0,0,0.02")
+        hand = self.start(BRIDGE, "--socket", self.name, "--seconds", 60, "--to", "0,0,0.02")
         messages = self.finish(runtime)
         self.assertRegex(messages, r"the tool never touched the body: move the device on.*the tool ended at \(.*\) m; the body rests in \(0, 0, 0\)")
         hand.terminate()
         self.assertIn("no force was ever felt", hand.communicate(timeout=PATIENCE)[0])
 
-    def test_a_stranger_is_told_where_the_key_is(self):
+    def test_its_socket_is_for_this_user_and_as_long_as_it_runs(self):
         runtime = self.play("--duration", "0.2")
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.settimeout(0.2)
-            while not key_file(self.port).exists():
-                time.sleep(0.02)
-            hello = struct.pack("<4sHHQIIQ3d3d4f f 5f 8x", b"PLPS", 2, 128, 0, 1, 0, 1, *[0.0] * 6, 1.0, *[0.0] * 9)
-            for _ in range(3):
-                stranger.sendto(hello, ("127.0.0.1", self.port))
-                with self.assertRaises(TimeoutError):
-                    stranger.recv(256)
-        self.assertEqual(key_file(self.port).stat().st_mode & 0o777, 0o600)
+        self.wait_for(lambda: "waiting for bridge:" in runtime.messages.read_text(), runtime)
+        self.assertEqual(self.name.stat().st_mode & 0o777, 0o600)
         self.hand(60, 0.0, 0.0, 0.1)
-        messages = self.finish(runtime)
-        self.assertIn(f"3 datagrams by seal (the key is in {key_file(self.port)})", messages)
-        self.assertFalse(key_file(self.port).exists(), "it is gone with the runtime")
+        self.finish(runtime)
+        self.assertFalse(self.name.exists())
 
 
 class Choice(ProgramTest):
@@ -343,7 +348,7 @@ class Choice(ProgramTest):
             for piece in pieces:
                 self.assertIn(piece, result.stderr)
         for device, pieces in (("replay:none.mcap", ("none.mcap",)), (f"replay:{file}", ("is a model, not a recording",)),
-                               ("bridge:70000", ("70000",)), ("bridge:1.2.3.4:4270", ("1.2.3.4",))):
+                               (f"bridge:{self.folder / ('x' * 200)}", ("at most 107 bytes",)), ("bridge:/tmp/bridge.socket", ("/tmp", "somebody else may write there"))):
             self.assert_refused(run(RUNTIME, "play", file, "--device", device, cwd=self.folder), *pieces)
         self.assert_refused(run(RUNTIME, "play", file, "--device", f"script:{script}", "--cpu", "4000", cwd=self.folder),
                             "--cpu", "processor 4000")
@@ -356,12 +361,13 @@ class Choice(ProgramTest):
         self.assertEqual(listed.returncode, 0)
         self.assertIn("No HID device is attached", listed.stdout)
 
-    def test_two_runtimes_on_one_port(self):
+    def test_two_runtimes_at_one_socket(self):
         file = self.bake(cube_toml(2))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-            taken.bind(("127.0.0.1", 0))
-            port = taken.getsockname()[1]
-            self.assert_refused(run(RUNTIME, "play", file, "--device", f"bridge:{port}", cwd=self.folder), str(port))
+        name = self.folder / "bridge.socket"
+        with bridge_socket() as taken:
+            taken.bind(str(name))
+            taken.listen()
+            self.assert_refused(run(RUNTIME, "play", file, "--device", f"bridge:{name}", cwd=self.folder), str(name))
 
 
 class Scripted(ProgramTest):

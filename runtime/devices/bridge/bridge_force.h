@@ -3,29 +3,15 @@
 #define PALPATE_BRIDGE_FORCE_H
 
 #include <math.h>
-#include <stdint.h>
 
-enum { BRIDGE_ZERO = 0, BRIDGE_FORCE = 1, BRIDGE_LOCAL_MODEL = 2 };
-
-/* A command as its datagram says it. */
-struct bridge_command {
-  uint32_t mode;
-  double damping;      /* b [N s/m] */
-  double force[3];     /* F, on the hand with the device at `point` [N] */
-  double point[3];     /* x0 [m] */
-  double torque[3];    /* T, on the hand [N m] */
-  double stiffness[6]; /* K: xx, yy, zz, xy, yz, zx [N/m] */
-  double radius;       /* of what the model knows about x0 [m] */
-  double time_to_live; /* [s] */
-  double fade;         /* [s] */
-  double max_force;    /* 0: not said [N] */
-};
+#include "bridge_wire.h"
 
 /* What is left of a command `age` after it arrived: all for its time to live, then less and less. */
 static inline double bridge_share(const struct bridge_command* command, double age) {
-  const double late = age - command->time_to_live;
-  if (command->mode == BRIDGE_ZERO || !(late < command->fade || late <= 0.0)) return 0.0;
-  return late <= 0.0 ? 1.0 : 1.0 - late / command->fade;
+  const double late = age - 1e-3 * command->time_to_live, fade = 1e-3 * command->fade;
+  if (command->mode == BRIDGE_ZERO || command->mode > BRIDGE_LOCAL_MODEL) return 0.0;
+  if (late <= 0.0) return 1.0;
+  return late < fade ? 1.0 - late / fade : 0.0;
 }
 
 /* No longer than `most` (0: not said), and nothing where it is no number. */
@@ -39,7 +25,7 @@ static inline void bridge_clamp(double vector[3], double most) {
  * radius from x0 with x - x0 cut to it; F alone where there is no model. */
 static inline void bridge_force(const struct bridge_command* command, const double x[3], const double v[3],
                                 double age, double device_max_force, double force[3]) {
-  const double* K = command->stiffness;
+  const float* K = command->stiffness;
   const double share = bridge_share(command, age);
   double d[3] = {0.0, 0.0, 0.0}, b = 0.0;
   if (command->mode == BRIDGE_LOCAL_MODEL) {

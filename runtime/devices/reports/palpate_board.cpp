@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/little_endian.h"
+#include "runtime/devices/reports/little_endian.h"
 #include "runtime/safety/saturation.h"
 
 namespace palpate {

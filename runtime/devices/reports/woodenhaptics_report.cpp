@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/little_endian.h"
+#include "runtime/devices/reports/little_endian.h"
 
 namespace palpate {
 namespace {

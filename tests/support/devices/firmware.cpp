@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/little_endian.h"
+#include "runtime/devices/reports/little_endian.h"
 #include "runtime/safety/monotonic_clock.h"
 
 namespace palpate {

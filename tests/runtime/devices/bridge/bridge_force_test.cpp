@@ -19,17 +19,24 @@ Mat3 stiffness() {
   return K;
 }
 
+constexpr double radius = 1.0 / 512.0;  // as a float has it [m]
+
 bridge_command local_model() {
-  return {BRIDGE_LOCAL_MODEL,
-          0.5,
+  return {{'P', 'L', 'P', 'C'},
+          BRIDGE_VERSION,
+          0,
+          BRIDGE_LOCAL_MODEL,
+          0,
           {1.0, -2.0, 0.5},
           {0.01, 0.02, 0.03},
-          {0.0, 0.0, 0.0},
+          {0.0F, 0.0F, 0.0F},
           {400, 300, 500, 30, 10, -20},
-          0.002,
-          0.010,
-          0.020,
-          0.0};
+          0.5F,
+          static_cast<float>(radius),
+          0.0F,
+          10,
+          20,
+          0};
 }
 
 Vec3 shown(const bridge_command& command, const Vec3& x, const Vec3& v, double age, double most = 0.0) {
@@ -48,7 +55,7 @@ TEST(BridgeForce, LocalModelWithinRadiusAndTime) {
 
 TEST(BridgeForce, AtTheEdgeBeyondTheRadius) {
   const Vec3 direction = Vec3(1, 2, -2) / 3.0, v(0.1, 0.2, -0.3);
-  const Vec3 expected = force_at_point - stiffness() * (0.002 * direction) - 0.5 * v;
+  const Vec3 expected = force_at_point - stiffness() * (radius * direction) - 0.5 * v;
   for (const double distance : {0.002, 0.0021, 0.5}) {
     EXPECT_LT((shown(local_model(), point + distance * direction, v, 0.001) - expected).norm(), 1e-12);
   }
@@ -62,7 +69,7 @@ TEST(BridgeForce, FadesEvenlyAfterItsTime) {
     EXPECT_LT((shown(local_model(), point + d, Vec3::Zero(), age) - share * whole).norm(), 1e-12) << age;
   }
   bridge_command hard = local_model();
-  hard.fade = 0.0;
+  hard.fade = 0;
   EXPECT_EQ(bridge_share(&hard, 0.010), 1.0);
   EXPECT_EQ(bridge_share(&hard, 0.0100001), 0.0);
 }
@@ -71,15 +78,17 @@ TEST(BridgeForce, WithoutAModelTheForceAlone) {
   bridge_command command = local_model();
   command.mode = BRIDGE_FORCE;
   EXPECT_EQ(shown(command, Vec3(5, 5, 5), Vec3(1, 1, 1), 0.001), force_at_point);
-  command.mode = BRIDGE_ZERO;
-  EXPECT_EQ(shown(command, point, Vec3::Zero(), 0.001), Vec3::Zero());
+  for (const std::uint32_t mode : {std::uint32_t{BRIDGE_ZERO}, 3U, 0xFFFFFFFFU}) {
+    command.mode = mode;
+    EXPECT_EQ(shown(command, point, Vec3::Zero(), 0.001), Vec3::Zero()) << mode;
+  }
 }
 
 TEST(BridgeForce, NoMoreThanBothMayShow) {
   bridge_command command = local_model();
   command.mode = BRIDGE_FORCE;
   const double length = force_at_point.norm();  // 2.29
-  const auto expect = [&](double commands, double devices, double most) {
+  const auto expect = [&](float commands, double devices, double most) {
     command.max_force = commands;
     const Vec3 force = shown(command, point, Vec3::Zero(), 0.0, devices);
     EXPECT_LT((force - force_at_point * (most / length)).norm(), 1e-12) << commands << " " << devices;
@@ -94,25 +103,25 @@ TEST(BridgeForce, NoMoreThanBothMayShow) {
 
 TEST(BridgeForce, TorqueFadesAndIsClamped) {
   bridge_command command = local_model();
-  command.torque[0] = 0.3;
-  command.torque[2] = -0.4;
+  command.torque[0] = 0.375F;
+  command.torque[2] = -0.5F;
   const auto torque = [&](double age, double most) {
     Vec3 result;
     bridge_torque(&command, age, most, result.data());
     return result;
   };
-  EXPECT_EQ(torque(0.01, 0.0), Vec3(0.3, 0, -0.4));
-  EXPECT_LT((torque(0.02, 0.0) - Vec3(0.15, 0, -0.2)).norm(), 1e-15);
+  EXPECT_EQ(torque(0.01, 0.0), Vec3(0.375, 0, -0.5));
+  EXPECT_LT((torque(0.02, 0.0) - Vec3(0.1875, 0, -0.25)).norm(), 1e-15);
   EXPECT_LT((torque(0.01, 0.1) - Vec3(0.06, 0, -0.08)).norm(), 1e-15);
   EXPECT_EQ(torque(0.04, 0.1), Vec3::Zero());
-  command.torque[1] = std::numeric_limits<double>::quiet_NaN();
+  command.torque[1] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(torque(0.01, 0.1), Vec3::Zero());
 }
 
 TEST(BridgeForce, NoRadiusTheForceAtThePoint) {
   bridge_command command = local_model();
-  for (const double radius : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    command.radius = radius;
+  for (const float none : {0.0F, -1.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    command.radius = none;
     EXPECT_EQ(shown(command, point + Vec3(0.1, 0, 0), Vec3::Zero(), 0.0), force_at_point);
   }
 }

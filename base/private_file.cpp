@@ -1,4 +1,4 @@
-#include "runtime/devices/bridge/secret_file.h"
+#include "base/private_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -18,26 +18,16 @@ namespace palpate {
 namespace {
 
 constexpr mode_t of_others = S_IWGRP | S_IWOTH;
-constexpr const char* own_folder = "set XDG_RUNTIME_DIR to a folder that is yours alone (mode 0700)";
+constexpr const char* own_folder =
+    "take a folder that is yours alone (mode 0700), and let XDG_RUNTIME_DIR name it";
 
-[[noreturn]] void cannot_keep(const std::filesystem::path& folder, const std::string& why) {
-  throw Error("a secret cannot be kept there: " + why, folder.string(), own_folder);
-}
-
-void make_secret_folder(const std::filesystem::path& folder) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder.parent_path(), problem);
-  if (mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST)
-    cannot_keep(folder, std::system_category().message(errno));
-  struct stat found {};
-  if (lstat(folder.c_str(), &found) != 0) cannot_keep(folder, std::system_category().message(errno));
-  if (!S_ISDIR(found.st_mode) || found.st_uid != geteuid() || (found.st_mode & of_others) != 0)
-    cannot_keep(folder, "somebody else may write there");
+[[noreturn]] void refuse_folder(const std::filesystem::path& folder, const std::string& why) {
+  throw Error("the folder is not private: " + why, folder.string(), own_folder);
 }
 
 }  // namespace
 
-std::filesystem::path secret_file(const std::string& name) {
+std::filesystem::path private_file(const std::string& name) {
   struct Place {
     const char* variable;
     const char* below;
@@ -49,15 +39,26 @@ std::filesystem::path secret_file(const std::string& name) {
     if (folder != nullptr && *folder == '/')
       return std::filesystem::path(folder) / place.below / "palpate" / name;
   }
-  throw Error("there is no folder of yours to keep a secret in", name, own_folder);
+  throw Error("there is no private folder of yours", name, own_folder);
 }
 
-void write_secret(const std::filesystem::path& file, std::string_view text) {
-  make_secret_folder(file.parent_path());
+void make_private_folder(const std::filesystem::path& folder) {
+  std::error_code problem;
+  std::filesystem::create_directories(folder.parent_path(), problem);
+  if (mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST)
+    refuse_folder(folder, std::system_category().message(errno));
+  struct stat found {};
+  if (lstat(folder.c_str(), &found) != 0) refuse_folder(folder, std::system_category().message(errno));
+  if (!S_ISDIR(found.st_mode) || found.st_uid != geteuid() || (found.st_mode & of_others) != 0)
+    refuse_folder(folder, "somebody else may write there");
+}
+
+void write_private_file(const std::filesystem::path& file, std::string_view text) {
+  make_private_folder(file.parent_path());
   replace_file(file, text, S_IRUSR | S_IWUSR);
 }
 
-std::string read_secret(const std::filesystem::path& file) {
+std::string read_private_file(const std::filesystem::path& file) {
   const FileDescriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK), file);
   struct stat found {};
   if (opened.get() < 0 || fstat(opened.get(), &found) != 0) return {};
