@@ -86,7 +86,6 @@ void DeviceLink::read_reports() noexcept {
       lose();
       is_open = false;
     } else if (heard == DevicePort::ReadResult::report) {
-      if (reports_ == 0) first_ = state;
       heard_.next() = state;
       heard_.publish();
       heard_by_writer_.next() = state;

@@ -38,9 +38,8 @@ class DeviceLink : public Device {
   DeviceLink(const DeviceLink&) = delete;
   DeviceLink& operator=(const DeviceLink&) = delete;
 
-  /// Whether the device has said anything yet, and what.
+  /// Whether the device has said anything yet.
   [[nodiscard]] bool has_reported() const noexcept { return reports_ > 0; }
-  [[nodiscard]] DeviceState first_report() const noexcept { return first_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }  ///< when it was opened first
   [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
   [[nodiscard]] std::string refusals() const { return port_->refusals(); }
@@ -72,7 +71,6 @@ class DeviceLink : public Device {
   std::unique_ptr<DevicePort> port_;
   DeviceLinkOptions options_;
   std::string name_;
-  DeviceState first_;
 
   // From the reader to the loop and the writer.
   Latest<DeviceState> heard_;

@@ -104,18 +104,6 @@ std::optional<BoardInput> decode_board_input(std::span<const std::uint8_t> repor
   return input;
 }
 
-std::array<std::uint8_t, board_input_room> encode_board_input(const BoardInput& input) noexcept {
-  std::array<std::uint8_t, board_input_room> report{};
-  const auto axes = static_cast<std::size_t>(std::clamp(input.axes, least_board_axes, most_board_axes));
-  report[0] = input_id;
-  write_number(report, 1, input.sequence);
-  for (std::size_t k = 0; k < axes; ++k) {
-    write_number(report, 5 + 4 * k, input.values[k]);
-  }
-  write_number(report, 5 + 4 * axes, input.buttons);
-  return report;
-}
-
 DeviceState board_state(const BoardInput& input) noexcept {
   constexpr double micro = 1e-6;
   DeviceState state;
@@ -137,16 +125,6 @@ std::array<std::uint8_t, board_force_bytes> encode_board_force(const BoardForce&
     write_number(report, 5 + 2 * k, force.counts[k]);
   }
   return report;
-}
-
-std::optional<BoardForce> decode_board_force(std::span<const std::uint8_t> report) noexcept {
-  if (report.size() != board_force_bytes || report[0] != force_id) return std::nullopt;
-  BoardForce force;
-  force.sequence = read_number<std::uint32_t>(report, 1);
-  for (std::size_t k = 0; k < 3; ++k) {
-    force.counts[k] = read_number<std::int16_t>(report, 5 + 2 * k);
-  }
-  return force;
 }
 
 DeviceLimits BoardFeature::limits() const noexcept {
@@ -175,20 +153,6 @@ std::optional<BoardFeature> decode_board_feature(std::span<const std::uint8_t> r
     return std::nullopt;
   }
   return feature;
-}
-
-std::array<std::uint8_t, board_feature_bytes> encode_board_feature(const BoardFeature& feature) noexcept {
-  std::array<std::uint8_t, board_feature_bytes> report{};
-  report[0] = feature_id;
-  report[1] = board_version;
-  report[2] = static_cast<std::uint8_t>(feature.axes);
-  write_number(report, 3, feature.watchdog);
-  write_number(report, 5, feature.force_unit);
-  write_number(report, 9, feature.max_force);
-  write_number(report, 13, feature.max_stiffness);
-  write_number(report, 17, feature.max_damping);
-  write_number(report, 21, feature.workspace_radius);
-  return report;
 }
 
 BoardCounts board_counts(const BoardFeature& feature, const Vec3& force) noexcept {

@@ -36,12 +36,9 @@ struct BoardInput {
 constexpr std::size_t board_input_bytes(int axes) noexcept {
   return 1 + 4 + 4 * static_cast<std::size_t>(axes) + 2;
 }
-constexpr std::size_t board_input_room = board_input_bytes(most_board_axes);
 
 /// Empty for another id or length, a place beyond 10 m and an angle beyond 2 pi.
 [[nodiscard]] std::optional<BoardInput> decode_board_input(std::span<const std::uint8_t> report) noexcept;
-/// What firmware does. The first board_input_bytes(input.axes) bytes are the report.
-[[nodiscard]] std::array<std::uint8_t, board_input_room> encode_board_input(const BoardInput& input) noexcept;
 
 /// In SI units; without velocity and time.
 [[nodiscard]] DeviceState board_state(const BoardInput& input) noexcept;
@@ -56,8 +53,6 @@ struct BoardForce {
 };
 [[nodiscard]] std::array<std::uint8_t, board_force_bytes> encode_board_force(
     const BoardForce& force) noexcept;
-/// What firmware does. Empty for another id or length.
-[[nodiscard]] std::optional<BoardForce> decode_board_force(std::span<const std::uint8_t> report) noexcept;
 
 // --- feature report 3: version u8, axes u8, watchdog u16, force unit, largest force, stiffness, damping,
 // radius u32 ---
@@ -79,9 +74,6 @@ struct BoardFeature {
 
 /// Empty for another id, length or version, and for numbers outside the bounds above.
 [[nodiscard]] std::optional<BoardFeature> decode_board_feature(std::span<const std::uint8_t> report) noexcept;
-/// What firmware does.
-[[nodiscard]] std::array<std::uint8_t, board_feature_bytes> encode_board_feature(
-    const BoardFeature& feature) noexcept;
 
 /// A force in the board's unit, and how much of it that is.
 struct BoardCounts {

@@ -142,13 +142,11 @@ TEST_F(DeviceLinkTest, HandsReportsToTheLoopAndCommandsToTheDevice) {
   EXPECT_FALSE(link->has_reported());
   wire_->say(at({0.1, 0.2, 0.3}, 7));
   wait_for([&] { return link->has_reported(); });
-  EXPECT_EQ(link->first_report().sequence, 7U);
   wire_->say(at({0.4, 0.5, 0.6}, 8));
   wait_for([&] { return link->reports() == 2; });
   const DeviceNews news = link->poll({});
   EXPECT_EQ(news.events, DeviceEvent::none);
   EXPECT_EQ(news.state.pose.position, Vec3(0.4, 0.5, 0.6));
-  EXPECT_EQ(link->first_report().sequence, 7U);
 
   DeviceCommand command;
   command.wrench = {.force = {1, 2, 3}, .torque = {4, 5, 6}};

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/devices/reports/little_endian.h"
 #include "runtime/safety/monotonic_clock.h"
+#include "tests/support/devices/board_codec.h"
 
 namespace palpate {
 namespace {
@@ -212,8 +212,7 @@ std::optional<Bytes> BoardFirmware::do_input() {
     input.values[k] = static_cast<std::int32_t>(std::lround(1e6 * place[static_cast<Eigen::Index>(k)]));
   }
   ++sequence_;
-  const auto report = encode_board_input(input);
-  return Bytes(report.begin(), report.begin() + board_input_bytes(3));
+  return encode_board_input(input);
 }
 
 void BoardFirmware::do_output(std::span<const std::uint8_t> report) {
@@ -229,8 +228,7 @@ void BoardFirmware::do_output(std::span<const std::uint8_t> report) {
 
 std::optional<Bytes> BoardFirmware::do_get_feature(std::uint8_t id) {
   if (id != 3) return std::nullopt;
-  const auto report = encode_board_feature(feature_);
-  return Bytes(report.begin(), report.end());
+  return encode_board_feature(feature_);
 }
 
 // --- joystick ---

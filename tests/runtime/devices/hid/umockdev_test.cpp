@@ -16,6 +16,7 @@
 
 #include "base/error.h"
 #include "runtime/devices/hid/hid_port.h"
+#include "tests/support/devices/board_codec.h"
 #include "tests/support/devices/emulated_bus.h"
 #include "tests/support/folders.h"
 

@@ -8,7 +8,7 @@
 #include "runtime/devices/reports/pid_sequence.h"
 #include "runtime/devices/reports/space_mouse.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
-#include "tests/support/devices/bytes.h"
+#include "tests/support/devices/board_codec.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define PALPATE_OWN_MALLOC 0  // sanitizers have their own
