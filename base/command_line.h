@@ -3,12 +3,16 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "base/command_pages.h"
 #include "base/command_tree.h"
+#include "base/error.h"
+#include "base/help_json.h"
+#include "base/json_text.h"
 #include "base/spelling.h"
 
 namespace palpate {
@@ -169,6 +173,20 @@ inline std::string help_page(const CLI::App& app, const HelpArguments& arguments
     return man_page(program, PALPATE_VERSION, {"palpate-precompute", "palpate-runtime"});
   if (arguments.format == "bash") return bash_completion(program);
   return arguments.format == "zsh" ? zsh_completion(program) : fish_completion(program);
+}
+
+/// True if `--help=json` is all that was written.
+inline bool asks_for_json(int argc, char** argv) {
+  return argc == 2 && std::string_view(argv[1]) == "--help=json";
+}
+
+/// Prints `help_json` of a program, with tables of its own by their names; returns exit_ok.
+inline int print_help_json(const CLI::App& app, const nlohmann::ordered_json& tables) {
+  nlohmann::ordered_json json = help_json(app);
+  json["version"] = PALPATE_VERSION;
+  json.update(tables);
+  std::fputs(json_text(json, 1).c_str(), stdout);
+  return exit_ok;
 }
 
 }  // namespace palpate

@@ -17,6 +17,7 @@
 #include "precompute/bake.h"
 #include "precompute/bake_report.h"
 #include "precompute/compare.h"
+#include "precompute/description/keys_json.h"
 #include "precompute/description/not_a_description.h"
 #include "precompute/description/read_description.h"
 #include "precompute/draft_command.h"
@@ -309,6 +310,7 @@ int run_commands(int argc, char** argv) {
   const CLI::App* verify_command = add_verify(app, arguments);
   const CLI::App* compare_command = add_compare(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
+  if (asks_for_json(argc, argv)) return print_help_json(app, {{"model", keys_json()}});
   try {
     parse(app, argc, argv);
     if (help_command->parsed()) {

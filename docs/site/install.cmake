@@ -5,7 +5,7 @@ if(EXISTS "${book}/index.html")
   file(INSTALL "${book}/" DESTINATION "${docdir}/html" PATTERN ".buildinfo" EXCLUDE PATTERN "objects.inv" EXCLUDE)
 else()
   file(INSTALL "${source}/docs" DESTINATION "${docdir}" FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.svg" PATTERN "*.webp"
-    PATTERN "describe" EXCLUDE PATTERN "site" EXCLUDE)
+    PATTERN "site" EXCLUDE)
 endif()
 foreach(page README.md CHANGELOG.md CONTRIBUTING.md runtime/devices/README.md)
   if(NOT EXISTS "${source}/${page}")

@@ -110,6 +110,7 @@ int run_rank_commands(int argc, char** argv, Team& team) {
   Arguments arguments;
   add_options(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
+  if (asks_for_json(argc, argv)) return print_help_json(app, nlohmann::ordered_json::object());
   try {
     parse(app, argc, argv);
     if (help_command->parsed()) {

@@ -25,6 +25,7 @@
 #include "runtime/loop/numbers.h"
 #include "runtime/push/push_command.h"
 #include "runtime/push/solved_settings.h"
+#include "runtime/safety/safety_options.h"
 
 namespace {
 
@@ -279,6 +280,24 @@ int view_files(const std::vector<std::filesystem::path>& files, const ViewerOpti
   return view(files, options);
 }
 
+/// Settings and bounds of safety, with units and defaults apart from their meanings.
+nlohmann::ordered_json number_tables() {
+  nlohmann::ordered_json settings = nlohmann::ordered_json::array(), safety = settings;
+  for (const Setting& setting : settings_table())
+    settings.push_back({{"name", setting.name},
+                        {"unit", setting.unit},
+                        {"otherwise", setting.otherwise},
+                        {"meaning", setting.meaning}});
+  for_each_safety_field(SafetyOptions{}, [&](const SafetyField& field, const auto& number) {
+    safety.push_back({{"name", field.name},
+                      {"otherwise", number},
+                      {"unit", field.unit},
+                      {"allowed", field.range.words},
+                      {"meaning", field.meaning}});
+  });
+  return {{"settings", settings}, {"safety", safety}};
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Lets a tool touch a precomputed elastic body and computes the finite-element forces.",
                "palpate-runtime");
@@ -302,6 +321,7 @@ int run(int argc, char** argv) {
   const CLI::App* export_command = add_export(app, arguments.exported);
   const CLI::App* devices_command = add_devices(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
+  if (asks_for_json(argc, argv)) return print_help_json(app, number_tables());
   const std::string first_word = argc > 1 ? argv[1] : "";
   if (const std::string hint = meant_by(app, first_word); !hint.empty()) {
     return tell_usage("'" + first_word + "' is no command", hint);

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/write_file.h"
+#include "formats/hdf5.h"
 #include "formats/recording_messages.h"
 
 namespace palpate {
@@ -40,6 +43,16 @@ void write_head(hdf5::File& file, const RecordingFile& recording) {
         surface.simplices);
   write(file, "/surface/held", {std::ssize(held)}, held);
 }
+
+/// A field of a tick as a dataset: /ticks/NAME, with a row of `components` numbers for each tick.
+struct TickColumn {
+  std::string name;
+  hdf5::ElementType type;
+  std::int64_t components = 1;
+  std::size_t offset = 0;  ///< of the numbers in TickRecord
+
+  [[nodiscard]] std::size_t bytes() const { return type.bytes * static_cast<std::size_t>(components); }
+};
 
 /// Notes where the fields of a tick lie.
 class ColumnFinder {
@@ -75,7 +88,10 @@ class ColumnFinder {
 };
 
 void write_ticks(hdf5::File& file, const RecordingFile& recording, TickRange ticks) {
-  const std::vector<TickColumn> columns = tick_columns();
+  const TickRecord tick;
+  ColumnFinder finder(tick);
+  for_each_tick_field(tick, finder);
+  const std::vector<TickColumn>& columns = finder.columns;  // in the order of the message
   for (const TickColumn& column : columns) {
     std::vector<std::int64_t> dims = {ticks.end - ticks.begin};
     if (column.components > 1) dims.push_back(column.components);
@@ -122,13 +138,6 @@ void write_frames(hdf5::File& file, const RecordingFile& recording, std::span<co
 }
 
 }  // namespace
-
-std::vector<TickColumn> tick_columns() {
-  const TickRecord tick;
-  ColumnFinder finder(tick);
-  for_each_tick_field(tick, finder);
-  return finder.columns;
-}
 
 void write_hdf5(const std::filesystem::path& file, const RecordingFile& recording, TickRange ticks,
                 std::span<const std::int64_t> pictures,
