@@ -6,10 +6,9 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "base/command_pages.h"
-#include "base/command_tree.h"
 #include "base/error.h"
 #include "base/help_json.h"
 #include "base/json_text.h"
@@ -115,11 +114,12 @@ inline const CLI::App* find_command(const CLI::App& app, const std::string& name
 /// "Did you mean --device? " where a word that is no option of the command was probably meant as one; else
 /// nothing.
 inline std::string meant_option(const CLI::App& app, int argc, char** argv) {
-  const CommandText command =
-      command_tree(app.get_subcommands().empty() ? app : *app.get_subcommands().front());
-  std::vector<std::string_view> known;
-  for (const ArgumentText& option : command.options)
-    known.insert(known.end(), option.names.begin(), option.names.end());
+  std::vector<std::string> names;
+  for (const CLI::Option* option :
+       arguments_of(app.get_subcommands().empty() ? app : *app.get_subcommands().front())) {
+    for (std::string& name : option_names(*option)) names.push_back(std::move(name));
+  }
+  const std::vector<std::string_view> known(names.begin(), names.end());
   for (int k = 1; k < argc; ++k) {
     const std::string_view argument = argv[k], word = argument.substr(0, argument.find('='));
     if (!word.starts_with("--") || std::ranges::find(known, word) != known.end()) continue;
@@ -128,25 +128,13 @@ inline std::string meant_option(const CLI::App& app, int argc, char** argv) {
   return "";
 }
 
-/// What `help` was given.
-struct HelpArguments {
-  std::string command;
-  std::string format = "text";
-};
-
-/// Adds `help [COMMAND]`, which writes manual pages and completions too.
-inline CLI::App* add_help_command(CLI::App& app, HelpArguments& arguments) {
+/// Adds `help [COMMAND]`.
+inline CLI::App* add_help_command(CLI::App& app, std::string& command) {
   CLI::App* help = app.add_subcommand("help", "print this page, or the page of a command");
-  help->add_option("COMMAND", arguments.command, "the command to explain")->type_name("");
-  help->add_option("--format", arguments.format,
-                   "print a manual page (man), or a completion script for a shell, of the whole program; "
-                   "default: text")
-      ->option_text("text|man|bash|zsh|fish")
-      ->check(CLI::IsMember({"text", "man", "bash", "zsh", "fish"}));
-  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) command->group("Commands");
-  help->footer("Examples:\n  " + app.get_name() + " help help\n  source <(" + app.get_name() +
-               " help --format bash)    complete in this shell with the Tab key\n  " + app.get_name() +
-               " help --format man > page.1; man ./page.1");
+  help->add_option("COMMAND", command, "the command to explain")->type_name("");
+  for (CLI::App* each : app.get_subcommands([](CLI::App*) { return true; })) each->group("Commands");
+  help->footer("Examples:\n  " + app.get_name() + " help help\n  " + app.get_name() +
+               " --help=json    all commands and options as data");
   return help;
 }
 
@@ -158,21 +146,6 @@ inline std::string help_page(const CLI::App& app, const std::string& command) {
   if (found == nullptr)
     throw CLI::ParseError("there is no command '" + command + "'", CLI::ExitCodes::ExtrasError);
   return formatter->make_help(found, app.get_name() + " " + command, CLI::AppFormatMode::Normal);
-}
-
-/// What `help` prints. Throws CLI::ParseError for a command that there is not.
-inline std::string help_page(const CLI::App& app, const HelpArguments& arguments) {
-  if (arguments.format == "text") return help_page(app, arguments.command);
-  if (!arguments.command.empty()) {
-    throw CLI::ParseError(
-        "--format " + arguments.format + " is of the whole program: leave out '" + arguments.command + "'",
-        CLI::ExitCodes::ExtrasError);
-  }
-  const CommandText program = command_tree(app);
-  if (arguments.format == "man")
-    return man_page(program, PALPATE_VERSION, {"palpate-precompute", "palpate-runtime"});
-  if (arguments.format == "bash") return bash_completion(program);
-  return arguments.format == "zsh" ? zsh_completion(program) : fish_completion(program);
 }
 
 /// True if `--help=json` is all that was written.

@@ -164,7 +164,7 @@ struct Arguments {
   bool unless_done = false;
   DraftArguments draft;
   CompareOptions compare;
-  HelpArguments help;
+  std::string help;
 };
 
 void add_bake(CLI::App& app, Arguments& arguments) {

@@ -23,7 +23,7 @@ struct Arguments {
   std::vector<std::string> models;
   std::string factor_of = "auto";
   BakeOptions bake;
-  HelpArguments help;
+  std::string help;
 };
 
 void add_options(CLI::App& app, Arguments& arguments) {

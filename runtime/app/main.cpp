@@ -49,7 +49,7 @@ struct Arguments {
   ExportOptions exported;
   std::vector<std::filesystem::path> recordings;
   ViewerArguments viewer;
-  HelpArguments help;
+  std::string help;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
