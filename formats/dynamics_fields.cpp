@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/model_check.h"
+#include "formats/field_counts.h"
 
 namespace palpate {
 namespace {

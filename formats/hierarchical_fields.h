@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "formats/model_check.h"
+#include "formats/field_counts.h"
 #include "formats/model_fields.h"
 #include "matrices/hierarchical.h"
 

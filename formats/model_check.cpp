@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 
 #include "base/error.h"
@@ -17,29 +16,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t unknown = -1;
 constexpr double unit_tolerance = 1e-9;  // of a direction's length
-
-std::int64_t smallest(Count count) {
-  switch (count) {
-    case Count::one:
-    case Count::elements:
-    case Count::materials:
-    case Count::stored_nodes:
-    case Count::patches:
-    case Count::modes:
-    case Count::smooth_terms:
-    case Count::near_pairs:
-    case Count::clusters:
-    case Count::warp_nodes:
-    case Count::warp_levels:
-      return 1;
-    case Count::nodes:
-      return 3;
-    default:
-      return 0;
-  }
-}
 
 /// What the sizes of the patches' matrices ask for.
 void count_patches(const Model& model, Counts& counts) {
@@ -55,11 +32,6 @@ void count_patches(const Model& model, Counts& counts) {
   counts.set(Count::patch_softening_entries, softening, "/overlay/nodes");
   counts.set(Count::patch_transfer_entries, transfer, "/overlay/nodes");
   counts.set(Count::patch_compliance_entries, compliance, "/overlay/surface_nodes");
-}
-
-bool counts_index_numbers(Count count) {
-  return count == Count::nodes || count == Count::elements || count == Count::simplices ||
-         count == Count::materials || count == Count::stored_nodes;
 }
 
 void check_plane(const std::vector<Vec3>& rows, const std::string& path, const std::string& where) {
@@ -196,16 +168,7 @@ void check_warp(const Model& model, const std::string& where) {
 
 }  // namespace
 
-void refuse(const std::string& where, const std::string& what) {
-  throw Error(what, where, "Copy the file again, or precompute it again");
-}
-
-Counts::Counts(std::string where) : where_(std::move(where)) {
-  values_.fill(unknown);
-  values_[static_cast<std::size_t>(Count::one)] = 1;
-}
-
-Counts Counts::of(const Model& model, std::string where) {
+Counts counts_of(const Model& model, std::string where) {
   Counts counts(std::move(where));
   if (model.scope == Scope::none) counts.allow_none_stored();
   const auto set = [&counts](Count count, std::size_t value, const char* path) {
@@ -232,43 +195,6 @@ Counts Counts::of(const Model& model, std::string where) {
     counts.set(Count::smooth_terms, model.greens.smooth()->terms, "/greens/smooth");
   if (model.compressed != nullptr) count_tree(*model.compressed, counts);
   return counts;
-}
-
-void Counts::set(Count count, std::int64_t value, const char* told_by) {
-  const std::int64_t least = count == Count::stored_nodes ? least_stored_ : smallest(count);
-  if (value < least)
-    refuse(where_, std::string(told_by) + " has " + std::to_string(value) + " entries, at least " +
-                       std::to_string(least) + " are needed");
-  if (counts_index_numbers(count) && value > std::numeric_limits<Index>::max() / 8)
-    refuse(where_,
-           std::string(told_by) + " has " + std::to_string(value) + " entries, more than can be numbered");
-  values_[static_cast<std::size_t>(count)] = value;
-  told_by_[static_cast<std::size_t>(count)] = told_by;
-}
-
-std::int64_t Counts::size(const Extent& extent) const {
-  return extent.factor * values_[static_cast<std::size_t>(extent.count)] + extent.plus;
-}
-
-std::vector<std::int64_t> Counts::sizes(const std::vector<Extent>& shape) const {
-  std::vector<std::int64_t> result;
-  result.reserve(shape.size());
-  for (const Extent& extent : shape) result.push_back(size(extent));
-  return result;
-}
-
-void Counts::match(const char* path, const std::vector<Extent>& shape,
-                   const std::vector<std::int64_t>& dims) {
-  for (std::size_t i = 0; i < shape.size(); ++i) {
-    const Extent& extent = shape[i];
-    const auto which = static_cast<std::size_t>(extent.count);
-    if (values_[which] == unknown) set(extent.count, (dims[i] - extent.plus) / extent.factor, path);
-    if (dims[i] == size(extent)) continue;
-    const bool by_another = told_by_[which] != nullptr && told_by_[which] != std::string(path);
-    const std::string teller = by_another ? std::string(" by ") + told_by_[which] : "";
-    refuse(where_, std::string(path) + " has size " + std::to_string(dims[i]) + ", " +
-                       std::to_string(size(extent)) + " is expected" + teller);
-  }
 }
 
 void check_model(const Model& model, const std::string& where) {

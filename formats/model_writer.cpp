@@ -248,7 +248,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
     : path(std::move(to)),
       partial(part ? path : with_suffix(path, ".partial")),
       header{precision},
-      counts(Counts::of(model, path.string())),
+      counts(counts_of(model, path.string())),
       element(model.mesh.element),
       order(model.stored_dofs()),
       matrices(streamed(model, precision)) {

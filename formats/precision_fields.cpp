@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "formats/model_check.h"
+#include "formats/field_counts.h"
 
 namespace palpate {
 namespace {

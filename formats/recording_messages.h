@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "formats/recording.h"
+#include "formats/recorded.h"
 
 namespace palpate {
 
