@@ -122,7 +122,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
-    stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes, jobs * ranks)});
+    stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes, jobs)});
   if (warp_levels > 0) stages.push_back({warp_stage, warp_factors * warp_levels * plan.factor_seconds});
   if (compression) {
     const std::vector<Stage> more = compression_stages(*compression, ranks);
@@ -367,17 +367,21 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
   return plans;
 }
 
-/// False, in all processes, when interrupted.
+/// By the threads of each process for itself: a block of vectors has work for two. False, in all processes,
+/// when interrupted.
 bool add_dynamics(const Description& description, const DynamicsPlan& plan, const ElasticBody& body,
                   const Stiffness& stiffness, const Factor& factor,
-                  const std::vector<std::int64_t>& stored_dofs, Sharing& sharing, Model& model,
-                  Progress& progress) {
+                  const std::vector<std::int64_t>& stored_dofs, Team& team, int jobs, Model& model,
+                  Progress& progress, const InterruptGuard& interrupt) {
   if (!description.dynamics) return true;
   if (plan.method == DynamicsMethod::modal) progress.begin(modes_stage);
+  Team alone;
+  const bool in_step = factor.spread_numbers() != nullptr;  // none may end before the others
+  TeamSharing sharing(alone, jobs, [&] { return !in_step && interrupt.requested(); });
   std::optional<StoredDynamics> dynamics = describe_dynamics(
       *description.dynamics, plan, stiffness.K, assemble_mass(body, stiffness, description.dynamics->lumped),
       factor, stored_dofs, sharing);
-  if (!dynamics) return false;
+  if (team.any(!dynamics)) return false;
   model.dynamics = *std::move(dynamics);
   return true;
 }
@@ -801,9 +805,8 @@ bool Bake::describe() {
                                                            options_.jobs, model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
   if (take_up()) return true;
-  TeamSharing sharing(team_, options_.jobs, [&] { return interrupt_.requested(); });
-  if (!add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, sharing,
-                    model_, progress_))
+  if (!add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, team_,
+                    options_.jobs, model_, progress_, interrupt_))
     return false;
   if (!add_warp(description_, team_, model_, progress_, interrupt_)) return false;
   if (!plans_.compression) {

@@ -7,12 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "base/parallel.h"
-
 namespace palpate {
 namespace {
 
-// Small items go together, so that the leader has no more messages than these, or these for each thread.
+// Small items go together, so that no more than these are drawn, or these by each thread.
 constexpr std::int64_t most_tiles = 4096, most_of_thread = 16;
 
 std::vector<Tile> tiles_of(std::int64_t items, std::int64_t threads) {
@@ -26,31 +24,7 @@ std::vector<Tile> tiles_of(std::int64_t items, std::int64_t threads) {
 
 }  // namespace
 
-/// No queue: its messages would take longer than the items.
-bool TeamSharing::for_each_alike(const SharedItems& items) {
-  const std::int64_t rank = team_.rank(), size = team_.size();
-  const std::int64_t first = items.count * rank / size, last = items.count * (rank + 1) / size;
-  parallel_for(last - first, jobs_, [&](std::int64_t i, int worker) { items.work(first + i, worker); });
-  bool stopped = interrupted_();
-  Parcel own;
-  own.carry(stopped);
-  if (size > 1)
-    for (std::int64_t item = first; item < last; ++item) items.carry(item, own);
-  std::int64_t from = 0;  // the others come by rank
-  team_.exchange(own.bytes(), [&](std::string_view bytes) {
-    if (from == rank) ++from;
-    Parcel results(bytes);
-    bool stopped_there = false;
-    results.carry(stopped_there);
-    stopped = stopped || stopped_there;
-    for (std::int64_t item = items.count * from / size; !results.empty(); ++item) items.carry(item, results);
-    ++from;
-  });
-  return !stopped;
-}
-
 bool TeamSharing::for_each(const SharedItems& items) {
-  if (items.alike) return for_each_alike(items);
   const bool alone = team_.size() == 1;
   std::string own;  // results of this process, each after its item's number
   std::mutex mutex;

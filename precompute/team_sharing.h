@@ -19,8 +19,6 @@ class TeamSharing : public Sharing {
   bool for_each(const SharedItems& items) override;
 
  private:
-  bool for_each_alike(const SharedItems& items);
-
   Team& team_;
   int jobs_;
   std::function<bool()> interrupted_;

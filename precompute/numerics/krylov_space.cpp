@@ -1,7 +1,6 @@
 #include "precompute/numerics/krylov_space.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace palpate {
 namespace {
@@ -45,9 +44,8 @@ SharedPencil::SharedPencil(const Factor& factor, const SparseMatrix& M, Sharing&
       M_(M.pruned()),
       sharing_(sharing) {}
 
-void SharedPencil::share(SharedItems items) {
-  items.alike = true;
-  if (!stopped_) stopped_ = !sharing_.for_each(items);
+void SharedPencil::share(std::int64_t items, const std::function<void(std::int64_t item, int worker)>& work) {
+  if (!stopped_) stopped_ = !sharing_.for_each({items, work, {}});
 }
 
 Matrix SharedPencil::inverse_times(Matrix B) {
@@ -56,49 +54,30 @@ Matrix SharedPencil::inverse_times(Matrix B) {
     std::copy(x.begin(), x.end(), B.data());
     return B;
   }
-  const auto columns = [&](std::int64_t item) {
+  share(pieces(B.cols(), columns_together), [&](std::int64_t item, int worker) {
     const std::int64_t first = item * columns_together;
-    return B.middleCols(first, std::min(columns_together, B.cols() - first));
-  };
-  share({pieces(B.cols(), columns_together),
-         [&](std::int64_t item, int worker) {
-           auto some = columns(item);
-           sweeps_.solve(some.data(), some.cols(), workspaces_[static_cast<std::size_t>(worker)]);
-         },
-         [&](std::int64_t item, Parcel& results) {
-           auto some = columns(item);
-           results.carry(std::span(some.data(), static_cast<std::size_t>(some.size())));
-         }});
+    auto some = B.middleCols(first, std::min(columns_together, B.cols() - first));
+    sweeps_.solve(some.data(), some.cols(), workspaces_[static_cast<std::size_t>(worker)]);
+  });
   return B;
 }
 
 Matrix SharedPencil::mass_times(const Matrix& W) {
   Matrix result(W.rows(), W.cols());
-  const auto columns = [&](std::int64_t item) {
-    const std::int64_t first = item * columns_together;
-    return std::pair{first, std::min(columns_together, W.cols() - first)};
-  };
-  share({pieces(W.cols(), columns_together),
-         [&](std::int64_t item, int) {
-           const auto [first, count] = columns(item);
-           result.middleCols(first, count).noalias() =
-               M_.selfadjointView<Eigen::Lower>() * W.middleCols(first, count);
-         },
-         [&](std::int64_t item, Parcel& results) {
-           const auto [first, count] = columns(item);
-           results.carry(std::span(result.col(first).data(), static_cast<std::size_t>(count * W.rows())));
-         }});
+  share(pieces(W.cols(), columns_together), [&](std::int64_t item, int) {
+    const std::int64_t first = item * columns_together, count = std::min(columns_together, W.cols() - first);
+    result.middleCols(first, count).noalias() =
+        M_.selfadjointView<Eigen::Lower>() * W.middleCols(first, count);
+  });
   return result;
 }
 
 Matrix SharedPencil::product(const Matrix& A, const Matrix& B) {
   std::vector<Matrix> parts(static_cast<std::size_t>(pieces(order(), rows_together)));
-  share({std::ssize(parts),
-         [&](std::int64_t item, int) {
-           const Rows rows(item, order());
-           parts[static_cast<std::size_t>(item)].noalias() = rows_of(A, rows).transpose() * rows_of(B, rows);
-         },
-         [&](std::int64_t item, Parcel& results) { results.carry(parts[static_cast<std::size_t>(item)]); }});
+  share(std::ssize(parts), [&](std::int64_t item, int) {
+    const Rows rows(item, order());
+    parts[static_cast<std::size_t>(item)].noalias() = rows_of(A, rows).transpose() * rows_of(B, rows);
+  });
   return stopped_ ? Matrix::Zero(A.cols(), B.cols()) : sum(parts);
 }
 
@@ -116,29 +95,20 @@ void KrylovSpace::append(const Matrix& Q) {
 
 Matrix KrylovSpace::coefficients(const Matrix& M_W) {
   std::vector<Matrix> parts(blocks_.size());
-  pencil_.share(
-      {std::ssize(blocks_),
-       [&](std::int64_t block, int) {
-         const auto b = static_cast<std::size_t>(block);
-         parts[b].noalias() = blocks_[b].leftCols(size_).transpose() * rows_of(M_W, Rows(block, M_W.rows()));
-       },
-       [&](std::int64_t block, Parcel& results) { results.carry(parts[static_cast<std::size_t>(block)]); }});
+  pencil_.share(std::ssize(blocks_), [&](std::int64_t block, int) {
+    const auto b = static_cast<std::size_t>(block);
+    parts[b].noalias() = blocks_[b].leftCols(size_).transpose() * rows_of(M_W, Rows(block, M_W.rows()));
+  });
   return pencil_.stopped() ? Matrix::Zero(size_, M_W.cols()) : sum(parts);
 }
 
 void KrylovSpace::remove(const Matrix& coefficients, Matrix& W) {
-  std::vector<Matrix> parts(blocks_.size());
-  pencil_.share(
-      {std::ssize(blocks_),
-       [&](std::int64_t block, int) {
-         const auto b = static_cast<std::size_t>(block);
-         parts[b] = rows_of(W, Rows(block, W.rows()));
-         parts[b].noalias() -= blocks_[b].leftCols(size_) * coefficients;
-       },
-       [&](std::int64_t block, Parcel& results) { results.carry(parts[static_cast<std::size_t>(block)]); }});
-  if (pencil_.stopped()) return;
-  for (std::size_t b = 0; b < parts.size(); ++b)
-    rows_of(W, Rows(static_cast<std::int64_t>(b), W.rows())) = parts[b];
+  pencil_.share(std::ssize(blocks_), [&](std::int64_t block, int) {
+    const Rows rows(block, W.rows());
+    Matrix part = rows_of(W, rows);
+    part.noalias() -= blocks_[static_cast<std::size_t>(block)].leftCols(size_) * coefficients;
+    rows_of(W, rows) = part;
+  });
 }
 
 Matrix KrylovSpace::combine(const Matrix& Y) {

@@ -1,8 +1,9 @@
-// Vectors that an eigenvalue solver keeps, and the work on them that is shared.
+// Vectors that an eigenvalue solver keeps, and the work on them that threads share.
 #pragma once
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "base/parallel.h"
@@ -12,8 +13,8 @@
 
 namespace palpate {
 
-/// K^-1 and M on blocks of vectors [n, any], by who shares the work. Bytes depend on no number of threads or
-/// processes. Once `stopped`, in all processes, results are of no use.
+/// K^-1 and M on blocks of vectors [n, any], by threads. Bytes depend on no number of threads. Once
+/// `stopped`, results are of no use.
 class SharedPencil {
  public:
   /// `factor`: of K, computed. M: lower triangle. Keeps references.
@@ -26,9 +27,9 @@ class SharedPencil {
   [[nodiscard]] Eigen::MatrixXd mass_times(const Eigen::MatrixXd& W);                         ///< M W
   [[nodiscard]] Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);  ///< A^T B
 
-  /// Threads of all processes on items.
-  void share(SharedItems items);
-  /// Calls work(item) for each item, by threads of each process for itself.
+  /// Threads on items, until they are stopped.
+  void share(std::int64_t items, const std::function<void(std::int64_t item, int worker)>& work);
+  /// Calls work(item) for each item, stopped or not.
   template <class Work>
   void repeat(std::int64_t count, Work&& work) {
     parallel_for(count, sharing_.jobs(), [&](std::int64_t item, int) { work(item); });

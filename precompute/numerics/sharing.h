@@ -16,7 +16,6 @@ struct SharedItems {
   std::function<void(std::int64_t item, int worker)> work;        ///< by any thread of any process
   std::function<void(std::int64_t item, Parcel& results)> carry;  ///< between who worked and all others
   std::function<bool(double share)> done = [](double) { return true; };  ///< (0..1); false stops
-  bool alike = false;  ///< small and of one cost: each process has as many, and `done` is not called
 };
 
 /// Who shares work. All processes make the same calls in the same order.

@@ -56,14 +56,13 @@ struct Outcome {
 };
 
 /// Item k's results are k numbers k.
-Outcome share(Wire& wire, int rank, bool interrupted, bool alike) {
+Outcome share(Wire& wire, int rank, bool interrupted) {
   HalfTeam team(wire, rank);
   TeamSharing sharing(team, 1, [=] { return interrupted; });
   Outcome outcome;
   outcome.results.resize(7);
   SharedItems items;
   items.count = 7;
-  items.alike = alike;
   items.work = [&](std::int64_t item, int) {
     ++outcome.worked;
     outcome.results[static_cast<std::size_t>(item)].assign(static_cast<std::size_t>(item),
@@ -80,12 +79,12 @@ Outcome share(Wire& wire, int rank, bool interrupted, bool alike) {
   return outcome;
 }
 
-std::array<Outcome, 2> share_by_two(bool second_interrupted, bool alike = false) {
+std::array<Outcome, 2> share_by_two(bool second_interrupted) {
   Wire wire;
   std::array<Outcome, 2> outcomes;
   {
-    const std::jthread first([&] { outcomes[0] = share(wire, 0, false, alike); });
-    const std::jthread second([&] { outcomes[1] = share(wire, 1, second_interrupted, alike); });
+    const std::jthread first([&] { outcomes[0] = share(wire, 0, false); });
+    const std::jthread second([&] { outcomes[1] = share(wire, 1, second_interrupted); });
   }
   return outcomes;
 }
@@ -103,21 +102,8 @@ TEST(TeamSharing, GivesAllTheResultsToAll) {
   }
 }
 
-TEST(TeamSharing, GivesEachAsManyOfTheItemsThatAreAlike) {
-  const auto outcomes = share_by_two(false, true);
-  EXPECT_EQ(outcomes[0].worked, 3);
-  EXPECT_EQ(outcomes[1].worked, 4);
-  for (const Outcome& outcome : outcomes) {
-    EXPECT_TRUE(outcome.whole);
-    EXPECT_EQ(outcome.told, 0);
-    for (std::size_t k = 0; k < 7; ++k)
-      EXPECT_EQ(outcome.results[k], std::vector<double>(k, static_cast<double>(k)));
-  }
-}
-
 TEST(TeamSharing, EndsInAllWhereOneIsInterrupted) {
-  for (const bool alike : {false, true})
-    for (const Outcome& outcome : share_by_two(true, alike)) EXPECT_FALSE(outcome.whole);
+  for (const Outcome& outcome : share_by_two(true)) EXPECT_FALSE(outcome.whole);
 }
 
 }  // namespace

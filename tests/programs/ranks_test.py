@@ -114,10 +114,10 @@ class Bytes(RanksTest):
     def test_modes_and_overlays(self):
         self.check(self.write("model.toml", overlays_toml(6, 0.3) + '[dynamics]\nmethod = "modal"\nmodes = 10\n'), 1, 2, 4)
 
-    def test_modes_on_more_rows_and_columns_than_one_rank_takes(self):
+    def test_many_modes(self):
         self.check(self.write("model.toml", cube_toml(11) + '[dynamics]\nmethod = "modal"\nmodes = 30\n'), 1, 2, 3, 8)
 
-    def test_ranks_of_a_node_share_a_factor(self):
+    def test_ranks_draw_blocks_of_columns(self):
         model = self.write("model.toml", cube_toml(8))
         data = self.straight(model)
         report = self.folder / "report.json"
