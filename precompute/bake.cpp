@@ -437,25 +437,24 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
                                              SpreadNumbers& spread, const Shared& run, ModelWriter& writer) {
   Solved solved;
   std::string refused;  // why it is out of reach
-  if (!run.team.leads()) {
-    spread.serve();
-  } else {
+  const auto compress = [&](const std::function<bool()>& interrupted) {
     constexpr int one_thread = 1;  // only one solves with all ranks
     Team alone;
     try {
-      GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, run.interrupted);
+      GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, interrupted);
       if (compressor.solve_near({0, plan.frame.tree.leaves()}, writer, run.tiles))
         solved.compressed = compressor.compress(writer);
-      if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
+      if (solved.compressed == nullptr) return false;
+      solved.probes = make_probes(factor, plan.stored.dofs);
     } catch (const OutOfReach& error) {
       refused = to_text(error);
     }
-    spread.release();
-  }
+    return true;
+  };
+  const bool whole = work_while_others_serve(spread, run.team, run.interrupted, compress);
   refused = run.team.share(refused);
   if (!refused.empty()) throw OutOfReach(refused, "", "");
-  if (run.team.leads() && solved.compressed == nullptr) return {};
-  return solved;
+  return whole ? std::optional(std::move(solved)) : std::nullopt;
 }
 
 /// From here on a process that `reads` sees what all have written, on whatever machine. Those that do not
@@ -741,9 +740,9 @@ void Bake::assemble() {
 
 /// Hands the factor to all processes where that is asked for, or where one of them cannot hold it.
 void Bake::spread_where_needed(int ranks) {
-  const Spreading spreading = team_.spreading();
-  if (spreading == Spreading::never) return;
-  if (spreading == Spreading::where_needed && !team_.any(needs_more_memory(plans_.plan, team_.size_here())))
+  if (options_.spreading == Spreading::never) return;
+  if (options_.spreading == Spreading::where_needed &&
+      (!team_.can_spread() || !team_.any(needs_more_memory(plans_.plan, team_.size_here()))))
     return;
   spread_ = expected_spread_memory(*factor_, ranks);
   if (ranks == team_.size() || !options_.dry_run) {

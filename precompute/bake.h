@@ -19,6 +19,9 @@ struct PartNumber {
   std::int64_t parts = 1;
 };
 
+/// Whether the numbers of a factor are spread over the processes.
+enum class Spreading : std::uint8_t { never, where_needed, always };
+
 /// What is asked of a bake besides the description.
 struct BakeOptions {
   std::filesystem::path output;      ///< file to write
@@ -31,6 +34,7 @@ struct BakeOptions {
   bool join = false;                 ///< take the columns from parts
   std::vector<std::filesystem::path> parts{};  ///< those, or their folders; none: those beside the output
   bool keep_parts = false;                     ///< leave them there
+  Spreading spreading = Spreading::never;      ///< where needed: where one cannot hold a factor
   int ranks = 0;                               ///< that the plan is for; 0: as many as the team has
   std::filesystem::path report{};              ///< of the run, which is not to be lost; empty: none
 };

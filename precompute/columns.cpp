@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "precompute/spread_plan.h"
+
 namespace palpate {
 
 const char* column_stage(PackedMatrix matrix) {
@@ -50,23 +52,27 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRang
   const std::vector<std::int64_t> dofs =
       spread == nullptr ? std::vector<std::int64_t>() : solver.stored_dofs();
   double done = 0.0;
-  const TileWork work = {[&](const Tile& tile, int worker) {
-                           auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
-                           ColumnShare own{tile.first, tile.count};
-                           if (spread == nullptr) {
-                             solver.columns(tile.first, tile.count, workspace, packed);
-                           } else {
-                             own = spread->columns(dofs, tile.first, tile.count, packed);
-                           }
-                           if (own.count > 0) writer.write_columns(own.first, own.count, packed, matrix);
-                         },
-                         [&](const Tile& tile) {
-                           done += tile.cost;
-                           ++counts.solved;
-                           progress.reach(done / cost);
-                         },
-                         interrupted};
-  return spread == nullptr ? team.work(tiles, jobs, work) : team.work_together(tiles, work);
+  TileWork work = {[&](const Tile& tile, int worker) {
+                     auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
+                     if (spread == nullptr) {
+                       solver.columns(tile.first, tile.count, workspace, packed);
+                     } else {
+                       spread_columns(*spread, dofs, tile.first, tile.count, packed);
+                     }
+                     writer.write_columns(tile.first, tile.count, packed, matrix);
+                   },
+                   [&](const Tile& tile) {
+                     done += tile.cost;
+                     ++counts.solved;
+                     progress.reach(done / cost);
+                   },
+                   interrupted};
+  if (spread == nullptr) return team.work(tiles, jobs, work);
+  return work_while_others_serve(*spread, team, interrupted, [&](const std::function<bool()>& by_any) {
+    work.interrupted = by_any;
+    constexpr int one_thread = 1;  // only one solves with all processes
+    return Team().work(tiles, one_thread, work);
+  });
 }
 
 }  // namespace palpate

@@ -172,6 +172,7 @@ void check_memory(const Plan& plan, int ranks) {
       "memory",
       std::string("Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading") +
           ", or more nodes that share the factor (palpate-precompute-mpi)" +
+          (ranks > 1 ? ", or fewer ranks of this machine" : "") +
           (overlays.empty() ? "" : ", or smaller regions in [overlay]") +
           (dynamics.empty() ? "" : ", or fewer modes in [dynamics]"));
 }

@@ -17,6 +17,7 @@ constexpr double one_rank = 1.45, each_doubling = 0.3, uneven = 1.15;
 constexpr double solve_efficiency = 0.5;     // of sweeps together against those of a process alone
 constexpr double together_efficiency = 0.6;  // of factorising together
 constexpr double paths = 1.5;                // loads are swept to the root and back through all of the factor
+constexpr std::int64_t solution_copies = 3;  // of a block in the leader: gathered, by rows, by columns
 constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
 constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
 
@@ -33,7 +34,8 @@ SpreadMemory expected_spread_memory(const Factor& factor, int ranks) {
 
 void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, int jobs, Plan& plan) {
   const std::int64_t K_bytes = entries * (scalar + static_cast<std::int64_t>(sizeof(std::int64_t)));
-  const std::int64_t blocks = 2 * plan.block_columns * (plan.free_dofs + plan.stored_dofs) / ranks * scalar;
+  const std::int64_t blocks =
+      plan.block_columns * (2 * plan.free_dofs / ranks + solution_copies * plan.stored_dofs) * scalar;
   const std::int64_t touches = touched_columns * touched_copies * plan.free_dofs * scalar;
   plan.factor_bytes = memory.expected;
   plan.workspace_bytes = K_bytes + std::max(blocks, touches);
@@ -58,6 +60,30 @@ bool needs_more_memory(const Plan& plan, int ranks_here) {
 
 void spread_likewise(const Factor& first, const SparseMatrix& K, Team& team, int jobs, Factor& factor) {
   if (first.spread_numbers() != nullptr) factor.spread(team.spread(K, factor, jobs));
+}
+
+bool work_while_others_serve(SpreadNumbers& numbers, Team& team, const std::function<bool()>& interrupted,
+                             const LeadersWork& work) {
+  bool whole = false;
+  if (team.leads()) {
+    whole = work([&] { return interrupted() || numbers.interrupted(); });
+    numbers.release();
+  } else {
+    numbers.serve(interrupted);
+  }
+  return !team.share(whole ? "whole" : "").empty();
+}
+
+void spread_columns(SpreadNumbers& numbers, std::span<const std::int64_t> dofs, std::int64_t first,
+                    std::int64_t count, std::vector<double>& packed) {
+  const auto width = static_cast<std::size_t>(count);
+  const auto rows = dofs.subspan(static_cast<std::size_t>(first));
+  std::vector<double> loads(width * width, 0.0), solution(rows.size() * width);
+  for (std::size_t c = 0; c < width; ++c) loads[c * width + c] = 1.0;
+  numbers.multiply(rows.first(width), count, loads, rows, solution);
+  packed.clear();
+  for (std::size_t c = 0; c < width; ++c)
+    for (std::size_t row = c; row < rows.size(); ++row) packed.push_back(solution[row * width + c]);
 }
 
 }  // namespace palpate

@@ -43,16 +43,6 @@ bool Team::work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) 
   return !work.interrupted();
 }
 
-bool Team::work_together(const std::vector<Tile>& tiles, const TileWork& work) {
-  for (const Tile& tile : tiles) {
-    if (any(work.interrupted())) return false;
-    work.solve(tile, 0);
-    hand_over_lines();
-    if (leads()) work.done(tile);
-  }
-  return !any(work.interrupted());
-}
-
 std::unique_ptr<SpreadNumbers> Team::spread(const SparseMatrix& /*K*/, const Factor& /*analysed*/,
                                             int /*jobs*/) {
   throw std::logic_error("one process has nobody to spread a factor over");

@@ -37,13 +37,6 @@ struct TileWork {
   std::function<bool()> interrupted;                   ///< no more tiles are begun
 };
 
-/// Who has a factor of their own: the ranks of a node together, each rank of MPI, or all ranks together.
-/// Automatic is by node, and together the nodes where one cannot hold it.
-enum class FactorOf : std::uint8_t { automatic, node, rank, all };
-
-/// Whether the numbers of a factor are spread over the processes.
-enum class Spreading : std::uint8_t { never, where_needed, always };
-
 /// The processes of one bake. All make the same calls in the same order.
 class Team {
  public:
@@ -57,26 +50,19 @@ class Team {
 
   /// Whether this process tells of its progress.
   [[nodiscard]] virtual bool prints() const { return leads(); }
-  /// Whether this process has work; which of those it is; how many those are, and how many on this machine.
-  [[nodiscard]] virtual bool takes_part() const { return true; }
+  /// Number of this process, how many there are, and how many on this machine.
   [[nodiscard]] virtual int rank() const { return 0; }
   [[nodiscard]] virtual int size() const { return 1; }
   [[nodiscard]] virtual int size_here() const { return 1; }
   /// Threads where none are asked for.
   [[nodiscard]] virtual int default_jobs() const { return allotted_processors(); }
 
-  /// Forms the team, once, before all that follows.
-  virtual void form(FactorOf /*factor_of*/) {}
-
   /// Solves the leader's tiles with `jobs` threads of each process, in their order, and returns in all once
   /// all are done. False, in all, when one was interrupted.
   virtual bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work);
 
-  /// Solves tiles one after the other, all processes each of them together, and returns in all. False, in
-  /// all, when one was interrupted. Only the main thread of each process works.
-  bool work_together(const std::vector<Tile>& tiles, const TileWork& work);
-
-  [[nodiscard]] virtual Spreading spreading() const { return Spreading::never; }
+  /// Whether there are others that can hold a part of a factor each.
+  [[nodiscard]] virtual bool can_spread() const { return false; }
 
   /// The numbers of a factor of K, which is analysed, over the processes. `jobs`: threads of each. Throws
   /// Error.
@@ -89,21 +75,15 @@ class Team {
   /// The leader's text.
   virtual std::string share(std::string text) { return text; }
 
-  /// Gives `take` the bytes of each other process, one after the other.
+  /// Gives `take` the bytes of each other process, by rank.
   virtual void exchange(const std::string& /*bytes*/, const std::function<void(std::string_view)>& /*take*/) {
   }
-
-  /// The texts of all processes, by rank, in the leader; nothing in others.
-  virtual std::vector<std::string> gather(const std::string& text) { return {text}; }
 
   /// Gives the leader, before the tile that is being solved counts as done, a line for its `listen`.
   virtual void tell(const std::string& line) { listener_(line); }
   void listen(std::function<void(const std::string&)> listener) { listener_ = std::move(listener); }
 
  protected:
-  /// Gives the leader the lines of the tile that was solved together.
-  virtual void hand_over_lines() {}
-
   std::function<void(const std::string&)> listener_ = [](const std::string&) {};
 };
 

@@ -2,7 +2,7 @@
 # scripts/test --night=tests runs it. docs/contributing.md says why they are dear.
 set(palpate_dear
   # Ranks of MPI wait for each other in a loop, and are killed.
-  programs_ranks_test.Bytes                      test_ranks_of_a_node_share_a_factor
+  programs_ranks_test.Bytes                      test_ranks_draw_blocks_of_columns
   programs_ranks_test.Distributed                test_held_axes_have_no_columns
   programs_ranks_test.Dying                      test_a_signal_to_one_rank_stops_all
   programs_ranks_test.Misfits                    test_what_all_ranks_find_is_told_once

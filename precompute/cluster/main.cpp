@@ -33,6 +33,11 @@ Error of_rank(const Error& error, const RankTeam& team) {
 int run_ranks(int argc, char** argv, bool& failed) {
   RankTeam team;
   try {
+    int allowed = 0;
+    MPI_Query_thread(&allowed);
+    if (allowed < MPI_THREAD_SERIALIZED)
+      throw Error("this MPI is called by one thread only, and threads draw what they solve", "MPI",
+                  "Use an MPI with threads: most have them");
     const int status = run_rank_commands(argc, argv, team);
     team.end();
     return status;
@@ -66,7 +71,7 @@ int main(int argc, char** argv) {
     });
   }
   int provided = 0;
-  MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
+  MPI_Init_thread(&argc, &argv, MPI_THREAD_SERIALIZED, &provided);
   bool failed = false;
   const int status =
       palpate::run_program(palpate::program, "", [&] { return palpate::run_ranks(argc, argv, failed); });

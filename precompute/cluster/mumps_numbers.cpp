@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "precompute/cluster/rank_messages.h"
+#include "precompute/cluster/rank_calls.h"
 
 namespace palpate {
 namespace {
@@ -23,7 +23,7 @@ constexpr std::int64_t megabyte = 1'000'000;
 enum class Job : MUMPS_INT { begin = -1, end = -2, analyse = 1, factorize = 2, solve = 3 };
 
 /// What rank 0 says before ranks solve.
-enum class Call : std::int64_t { solve, columns, multiply, release };
+enum class Call : std::int64_t { solve, multiply, release };
 
 /// Entries of loads by columns, counted from 1, as MUMPS takes them.
 struct SparseLoads {
@@ -36,11 +36,10 @@ struct SparseLoads {
     values.push_back(value);
   }
   void end_column() { starts.push_back(static_cast<MUMPS_INT>(rows.size() + 1)); }
-  [[nodiscard]] std::int64_t columns() const { return std::ssize(starts) - 1; }
 };
 
-/// Rows of a solution that a rank has found, or has been given: `places` [rows] in the order of the caller's,
-/// `values` [rows x columns] column-major.
+/// Rows of a solution that a rank has found: `places` [rows] in the order of the caller's, `values`
+/// [rows x columns] column-major.
 struct SolutionRows {
   std::vector<int> places;
   std::vector<double> values;
@@ -57,12 +56,6 @@ Error failure(const DMUMPS_STRUC_C& mumps, const std::string& step) {
           "Use another number of ranks; where that does not help, please report it"};
 }
 
-/// Columns of a block that a rank is given.
-ColumnShare share_of_rank(std::int64_t first, std::int64_t count, int rank, int ranks) {
-  const std::int64_t begin = count * rank / ranks, end = count * (rank + 1) / ranks;
-  return {first + begin, end - begin};
-}
-
 class MumpsNumbers : public SpreadNumbers {
  public:
   MumpsNumbers(MPI_Comm ranks, const SparseMatrix& K, std::span<const std::int64_t> permutation,
@@ -73,11 +66,10 @@ class MumpsNumbers : public SpreadNumbers {
 
   void factorize() override;
   std::vector<double> solve(std::span<const double> b, std::int64_t columns) override;
-  ColumnShare columns(std::span<const std::int64_t> dofs, std::int64_t first, std::int64_t count,
-                      std::vector<double>& packed) override;
   void multiply(std::span<const std::int64_t> from, std::int64_t columns, std::span<const double> f,
                 std::span<const std::int64_t> to, std::span<double> u) override;
-  void serve() override;
+  void serve(const std::function<bool()>& interrupted) override;
+  [[nodiscard]] bool interrupted() const override { return interrupted_; }
   void release() override { announce(Call::release, 0, 0); }
   [[nodiscard]] SpreadMemory memory() const override { return memory_; }
 
@@ -95,8 +87,7 @@ class MumpsNumbers : public SpreadNumbers {
   Announcement announce(Call call, std::int64_t columns, std::int64_t rows);
   void solve_dense(std::span<double> x, std::int64_t columns);
   SolutionRows solve_sparse(SparseLoads loads, std::int64_t columns, const std::vector<int>& place_of);
-  SolutionRows share_out(const SolutionRows& found, std::int64_t columns, bool all_to_leader) const;
-  void take_part_in_multiply(std::int64_t columns, std::int64_t rows);
+  void gather(const SolutionRows& found, bool interrupted_here, std::int64_t columns, std::span<double> u);
   [[nodiscard]] std::vector<int> places(std::span<const std::int64_t> dofs) const;
   [[nodiscard]] bool leads() const { return rank_ == 0; }
 
@@ -109,6 +100,7 @@ class MumpsNumbers : public SpreadNumbers {
   std::vector<MUMPS_INT> order_;           // position of each dof, from 1
   std::vector<MUMPS_INT> rows_, columns_;  // of this rank's entries of K, from 1
   SpreadMemory memory_;
+  bool interrupted_ = false;
 };
 
 /// One rank's share of K: columns next to each other, whose values are used where they are.
@@ -287,81 +279,35 @@ SolutionRows MumpsNumbers::solve_sparse(SparseLoads loads, std::int64_t columns,
   return rows;
 }
 
-/// All rows, of this rank's share of the columns.
-SolutionRows MumpsNumbers::share_out(const SolutionRows& found, std::int64_t columns,
-                                     bool all_to_leader) const {
-  const auto share = [&](int rank) {
-    if (all_to_leader) return rank == 0 ? columns : 0;
-    return share_of_rank(0, columns, rank, size_).count;
-  };
+/// Rows to their places in the leader's u [places, columns], row-major.
+void MumpsNumbers::gather(const SolutionRows& found, bool interrupted_here, std::int64_t columns,
+                          std::span<double> u) {
   const auto ranks = static_cast<std::size_t>(size_);
-  std::vector<int> rows(ranks), first_row(ranks, 0), sent(ranks), send_at(ranks, 0), taken(ranks),
-      take_at(ranks, 0);
-  const int own = static_cast<int>(found.places.size());
-  MPI_Allgather(&own, 1, MPI_INT, rows.data(), 1, MPI_INT, ranks_);
+  std::vector<std::array<int, 2>> said(ranks);
+  const std::array<int, 2> own = {static_cast<int>(found.places.size()), interrupted_here ? 1 : 0};
+  MPI_Gather(own.data(), 2, MPI_INT, said.data(), 2, MPI_INT, 0, ranks_);
+  std::vector<int> rows(ranks), first_row(ranks + 1, 0), entries(ranks), first_entry(ranks + 1, 0);
   for (std::size_t r = 0; r < ranks; ++r) {
-    sent[r] = static_cast<int>(share(static_cast<int>(r))) * own;
-    taken[r] = static_cast<int>(share(rank_)) * rows[r];
-    if (r == 0) continue;
-    first_row[r] = first_row[r - 1] + rows[r - 1];
-    send_at[r] = send_at[r - 1] + sent[r - 1];
-    take_at[r] = take_at[r - 1] + taken[r - 1];
+    interrupted_ = interrupted_ || said[r][1] != 0;
+    rows[r] = said[r][0];
+    entries[r] = rows[r] * static_cast<int>(columns);
+    first_row[r + 1] = first_row[r] + rows[r];
+    first_entry[r + 1] = first_entry[r] + entries[r];
   }
-  SolutionRows all;
-  all.places.resize(static_cast<std::size_t>(first_row.back()) + static_cast<std::size_t>(rows.back()));
-  MPI_Allgatherv(found.places.data(), own, MPI_INT, all.places.data(), rows.data(), first_row.data(), MPI_INT,
-                 ranks_);
-  std::vector<double> pieces(static_cast<std::size_t>(take_at.back()) +
-                             static_cast<std::size_t>(taken.back()));
-  MPI_Alltoallv(found.values.data(), sent.data(), send_at.data(), MPI_DOUBLE, pieces.data(), taken.data(),
-                take_at.data(), MPI_DOUBLE, ranks_);
-  all.values.resize(pieces.size());
-  for (std::size_t r = 0; r < ranks; ++r) {  // a rank's piece [its rows, columns] to its rows of all
-    for (std::int64_t c = 0; c < share(rank_); ++c)
-      std::copy_n(pieces.begin() + take_at[r] + c * rows[r], rows[r],
-                  all.values.begin() + c * std::ssize(all.places) + first_row[r]);
+  std::vector<int> places(static_cast<std::size_t>(first_row.back()));
+  std::vector<double> values(static_cast<std::size_t>(first_entry.back()));
+  MPI_Gatherv(found.places.data(), own[0], MPI_INT, places.data(), rows.data(), first_row.data(), MPI_INT, 0,
+              ranks_);
+  MPI_Gatherv(found.values.data(), own[0] * static_cast<int>(columns), MPI_DOUBLE, values.data(),
+              entries.data(), first_entry.data(), MPI_DOUBLE, 0, ranks_);
+  for (std::size_t r = 0; r < ranks; ++r) {  // a rank's piece is [its rows, columns]
+    for (std::int64_t row = 0; row < rows[r]; ++row) {
+      const std::int64_t place = places[static_cast<std::size_t>(first_row[r] + row)];
+      for (std::int64_t c = 0; c < columns; ++c)
+        u[static_cast<std::size_t>(place * columns + c)] =
+            values[static_cast<std::size_t>(first_entry[r] + c * rows[r] + row)];
+    }
   }
-  return all;
-}
-
-ColumnShare MumpsNumbers::columns(std::span<const std::int64_t> dofs, std::int64_t first, std::int64_t count,
-                                  std::vector<double>& packed) {
-  SparseLoads loads;
-  std::vector<std::int64_t> solved;  // columns of the block that are not held
-  for (std::int64_t c = 0; c < count; ++c) {
-    const std::int64_t dof = dofs[static_cast<std::size_t>(first + c)];
-    if (dof < 0) continue;
-    solved.push_back(first + c);
-    loads.add(dof, 1.0);
-    loads.end_column();
-  }
-  const std::int64_t width = std::ssize(solved);
-  std::vector<int> place_of = places(dofs);
-  for (int& place : place_of)
-    if (place < first) place = -1;  // rows above the diagonal are another block's columns
-  SolutionRows rows;
-  if (width > 0) rows = share_out(solve_sparse(std::move(loads), width, place_of), width, false);
-  const ColumnShare mine = share_of_rank(0, width, rank_, size_);
-  // A held column goes with the solved one before it.
-  const auto n = std::ssize(dofs);
-  const auto begin_of = [&](std::int64_t k) {
-    if (k == width && (width > 0 || rank_ > 0)) return first + count;
-    return k == 0 ? first : solved[static_cast<std::size_t>(k)];
-  };
-  ColumnShare share{begin_of(mine.first), begin_of(mine.first + mine.count) - begin_of(mine.first)};
-  if (width == 0 && leads()) share.count = count;
-  const auto start = [&](std::int64_t j) {  // of column j in `packed`
-    const std::int64_t k = j - share.first;
-    return k * (n - share.first) - k * (k - 1) / 2;
-  };
-  packed.assign(static_cast<std::size_t>(start(share.first + share.count)), 0.0);
-  for (std::int64_t c = 0; c < mine.count; ++c) {
-    const std::int64_t j = solved[static_cast<std::size_t>(mine.first + c)];
-    const double* values = rows.values.data() + c * std::ssize(rows.places);
-    for (std::size_t k = 0; k < rows.places.size(); ++k)
-      if (rows.places[k] >= j) packed[static_cast<std::size_t>(start(j) + rows.places[k] - j)] = values[k];
-  }
-  return share;
 }
 
 void MumpsNumbers::multiply(std::span<const std::int64_t> from, std::int64_t columns,
@@ -383,30 +329,24 @@ void MumpsNumbers::multiply(std::span<const std::int64_t> from, std::int64_t col
     loads.end_column();
   }
   const std::vector<int> place_of = places(to);
-  const SolutionRows rows = share_out(solve_sparse(std::move(loads), columns, place_of), columns, true);
   std::fill(u.begin(), u.end(), 0.0);
-  std::vector<std::size_t> row_at(to.size(), 0);
-  for (std::size_t k = 0; k < rows.places.size(); ++k) row_at[static_cast<std::size_t>(rows.places[k])] = k;
-  for (std::size_t k = 0; k < to.size(); ++k) {
-    if (to[k] < 0) continue;
-    const std::size_t row = row_at[static_cast<std::size_t>(place_of[static_cast<std::size_t>(to[k])])];
-    for (std::size_t c = 0; c < static_cast<std::size_t>(columns); ++c)
-      u[k * static_cast<std::size_t>(columns) + c] = rows.values[c * rows.places.size() + row];
+  gather(solve_sparse(std::move(loads), columns, place_of), false, columns, u);
+  for (std::int64_t k = 0; k < std::ssize(to); ++k) {  // a dof that is wanted twice has its row once
+    const std::int64_t dof = to[static_cast<std::size_t>(k)];
+    if (dof < 0) continue;
+    const std::int64_t place = place_of[static_cast<std::size_t>(dof)];
+    if (place != k) std::copy_n(u.begin() + place * columns, columns, u.begin() + k * columns);
   }
 }
 
-void MumpsNumbers::take_part_in_multiply(std::int64_t columns, std::int64_t rows) {
-  std::vector<std::int64_t> wanted(static_cast<std::size_t>(rows));
-  broadcast(wanted.data(), static_cast<int>(rows), MPI_INT64_T, ranks_);
-  share_out(solve_sparse({}, columns, places(wanted)), columns, true);
-}
-
-void MumpsNumbers::serve() {
+void MumpsNumbers::serve(const std::function<bool()>& interrupted) {
   while (true) {
     const Announcement said = announce({}, 0, 0);
     if (said.call == Call::release) return;
     if (said.call == Call::multiply) {
-      take_part_in_multiply(said.columns, said.rows);
+      std::vector<std::int64_t> wanted(static_cast<std::size_t>(said.rows));
+      broadcast(wanted.data(), static_cast<int>(said.rows), MPI_INT64_T, ranks_);
+      gather(solve_sparse({}, said.columns, places(wanted)), interrupted(), said.columns, {});
     } else {
       std::vector<double> x(static_cast<std::size_t>(said.columns * mumps_.n));
       solve_dense(x, said.columns);

@@ -5,8 +5,8 @@
 
 namespace palpate {
 
-/// Does what the command line says by the processes of `team`, which is not formed yet, and returns the exit
-/// status. All call it; the leader alone prints. Throws Error.
+/// Does what the command line says by the processes of `team` and returns the exit status. All call it; the
+/// leader alone prints. Throws Error.
 int run_rank_commands(int argc, char** argv, Team& team);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -14,12 +15,6 @@ struct SpreadMemory {
   std::int64_t used = 0;          ///< by the process that used most, once factorised [byte]
   std::int64_t used_all = 0;      ///< by all [byte]
   int room = 0;                   ///< work space beyond the estimate that the factorisation took [percent]
-};
-
-/// Columns [first, first + count) that a process is given of those that all have solved for.
-struct ColumnShare {
-  std::int64_t first = 0;
-  std::int64_t count = 0;
 };
 
 /// The numbers of a Cholesky factor over several processes. All make the same calls in the same order, unless
@@ -37,20 +32,15 @@ class SpreadNumbers {
   /// x = K^-1 b [n, columns] column-major, in every process.
   virtual std::vector<double> solve(std::span<const double> b, std::int64_t columns) = 0;
 
-  /// Solves for columns [first, first + count) of the lower triangle of K^-1 restricted to `dofs` [rows], -1
-  /// where a row is held, and gives each process about as many: one after the other, each from its diagonal
-  /// down, to `packed` (resized).
-  virtual ColumnShare columns(std::span<const std::int64_t> dofs, std::int64_t first, std::int64_t count,
-                              std::vector<double>& packed) = 0;
-
   /// u = K^-1 f at the dofs `to`, of loads f [from x columns] on the dofs `from`, both row-major, -1 where
   /// held. In the leader, while the others serve.
   virtual void multiply(std::span<const std::int64_t> from, std::int64_t columns, std::span<const double> f,
                         std::span<const std::int64_t> to, std::span<double> u) = 0;
 
-  /// Takes part in what the leader solves, until it calls `release`.
-  virtual void serve() = 0;
-  virtual void release() = 0;  ///< by the leader
+  /// Takes part in what the leader solves, until it calls `release`. The leader is told when `interrupted`.
+  virtual void serve(const std::function<bool()>& interrupted) = 0;
+  virtual void release() = 0;                          ///< by the leader
+  [[nodiscard]] virtual bool interrupted() const = 0;  ///< a process that serves, as the leader knows
 
   [[nodiscard]] virtual SpreadMemory memory() const = 0;
 };

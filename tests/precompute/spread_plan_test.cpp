@@ -21,23 +21,19 @@ class SmallNumbers : public SpreadNumbers {
   std::vector<double> solve(std::span<const double> b, std::int64_t /*columns*/) override {
     return {b.begin(), b.end()};
   }
-  ColumnShare columns(std::span<const std::int64_t> /*dofs*/, std::int64_t first, std::int64_t count,
-                      std::vector<double>& /*packed*/) override {
-    return {first, count};
-  }
   void multiply(std::span<const std::int64_t> /*from*/, std::int64_t /*columns*/,
                 std::span<const double> /*f*/, std::span<const std::int64_t> /*to*/,
                 std::span<double> /*u*/) override {}
-  void serve() override {}
+  void serve(const std::function<bool()>& /*interrupted*/) override {}
   void release() override {}
+  [[nodiscard]] bool interrupted() const override { return false; }
   [[nodiscard]] SpreadMemory memory() const override { return {.expected = 1000, .expected_all = 2000}; }
 };
 
 /// A process that says there are others.
 class Spreader : public Team {
  public:
-  explicit Spreader(Spreading spreading) : spreading_(spreading) {}
-  [[nodiscard]] Spreading spreading() const override { return spreading_; }
+  [[nodiscard]] bool can_spread() const override { return true; }
   std::unique_ptr<SpreadNumbers> spread(const SparseMatrix&, const Factor&, int) override {
     ++spread_;
     return std::make_unique<SmallNumbers>();
@@ -46,7 +42,6 @@ class Spreader : public Team {
   [[nodiscard]] int spread_times() const { return spread_; }
 
  private:
-  Spreading spreading_;
   int spread_ = 0;
 };
 
@@ -67,11 +62,12 @@ class SpreadPlan : public testing::Test {
   /// How many times a dry run with so much memory [MB] spreads the factor.
   int spread_with(const char* memory, Spreading spreading, int jobs) {
     ::setenv("SLURM_MEM_PER_NODE", memory, 1);
-    Spreader team(spreading);
+    Spreader team;
     BakeOptions options;
     options.output = folder_ / "x.palpate.hdf";
     options.jobs = jobs;
     options.dry_run = true;
+    options.spreading = spreading;
     bake(read_description(folder_ / "model.toml"), options, team);
     return team.spread_times();
   }

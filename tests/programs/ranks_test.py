@@ -39,7 +39,7 @@ class RanksTest(ProgramTest):
         return run(*self.command(ranks, *arguments), cwd=self.folder)
 
     def own_factors(self, ranks, *arguments):
-        """A run of ranks that don't share a factor, as those of several nodes; it must succeed."""
+        """A run of ranks that don't share a factor, whatever the memory; it must succeed."""
         result = self.ranks(ranks, *arguments, "--factor", "rank", "--jobs", "1")
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stderr
@@ -124,7 +124,11 @@ class Bytes(RanksTest):
         result = self.ranks(3, model, "--report", report)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual((self.folder / "cube.palpate.hdf").read_bytes(), data)
-        self.assertEqual(json.loads(report.read_text())["ranks"], 1)
+        numbers = json.loads(report.read_text())
+        self.assertEqual(numbers["ranks"], 3)
+        self.assertEqual(len(numbers["rank_memory_bytes"]), 3)
+        self.assertEqual(numbers["models"][0]["tiles_solved"], -(-numbers["models"][0]["stored_dofs"] // numbers["models"][0]["block_columns"]))
+        self.assertNotIn("factor_over_ranks", numbers["models"][0])  # each has one where the memory is there
 
     def test_one_machine_goes_on_with_what_ranks_left_and_the_reverse(self):
         model = self.write("model.toml", cube_toml(16))
@@ -413,14 +417,15 @@ class Misfits(RanksTest):
     def test_usage_is_told_once(self):
         model = self.write("model.toml", cube_toml(2))
         for arguments, piece in (((model, "--ranks", "3"), "--ranks goes with --dry-run"), ((), "MODEL.toml is required"),
-                                 ((model, model, "-o", "x"), "there are several"), ((model, "--factor", "some"), "--factor")):
+                                 ((model, model, "-o", "x"), "there are several"), ((model, "--factor", "some"), "--factor"),
+                                 ((model, model, "--factor", "distributed"), "--factor distributed is of one model")):
             result = self.ranks(2, *arguments)
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertEqual(result.stderr.count("error: "), 1, result.stderr)
             self.assertIn(piece, result.stderr)
 
     def test_help_needs_no_ranks(self):
-        self.assertIn("--factor auto|node|rank|distributed", run(RANKS, "--help").stdout)
+        self.assertIn("--factor auto|rank|distributed", run(RANKS, "--help").stdout)
         self.assertIn("palpate-precompute-mpi 0", run(RANKS, "--version").stdout)
 
 

@@ -5,8 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
-
-#include "precompute/cluster/rank_threads.h"
+#include <thread>
 
 namespace palpate {
 
@@ -16,15 +15,28 @@ inline void wait(MPI_Request& request) {
   for (int done = 0;;) {
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
     if (done != 0) return;
-    pause_for(pause);
+    std::this_thread::sleep_for(pause);
     pause = std::min<std::chrono::microseconds>(5 * pause / 4, std::chrono::milliseconds(5));
   }
 }
 
-/// From rank 0 to all.
-void broadcast(void* data, int count, MPI_Datatype type, MPI_Comm comm);
+/// From one rank to all.
+inline void broadcast(void* data, int count, MPI_Datatype type, MPI_Comm comm, int from = 0) {
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Ibcast(data, count, type, from, comm, &request);
+  wait(request);
+}
 
-int rank_in(MPI_Comm comm);
-int size_of(MPI_Comm comm);
+inline int rank_in(MPI_Comm comm) {
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  return rank;
+}
+
+inline int size_of(MPI_Comm comm) {
+  int size = 0;
+  MPI_Comm_size(comm, &size);
+  return size;
+}
 
 }  // namespace palpate
