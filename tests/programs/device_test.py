@@ -272,7 +272,7 @@ class Felt(ProgramTest):
     def test_signals_leave_no_force_and_a_whole_session(self):
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             with self.subTest(stop=stop):
-                runtime = self.play()
+                runtime = self.play("--force")  # in the place of the recording of the signal before
                 hand = self.own_hand(down_to(-0.02))
                 self.wait_for(lambda: hand.force > 0.2, runtime)
                 runtime.send_signal(stop)
