@@ -240,7 +240,7 @@ TEST_F(ViewedPlayTest, TheReportIsOfTheWholeRun) {
   EXPECT_EQ(rows[3].at("settings").at("stiffness-scale"), "2");
   EXPECT_TRUE(rows[4].at("recording").get<std::string>().starts_with("cube2-20"));
   EXPECT_TRUE(rows[5].at("recording").is_null());
-  EXPECT_EQ(rows[1].at("begun_s"), 0.001 * rows[0].at("ticks").get<double>());
+  EXPECT_DOUBLE_EQ(rows[1].at("begun_s"), 0.001 * rows[0].at("ticks").get<double>());
 }
 
 /// A device that a hand holds: where it is said to be, each millisecond.
