@@ -6,6 +6,7 @@
 
 #include <stdint.h>
 
+/* NOLINTBEGIN(readability-identifier-naming): names of C */
 enum { BRIDGE_VERSION = 3 };
 enum { BRIDGE_BUTTONS = 0xFFFF, BRIDGE_IN_USE = 1 << 16, BRIDGE_DEVICE_FAULT = 1 << 17 };
 enum { BRIDGE_ZERO = 0, BRIDGE_FORCE = 1, BRIDGE_LOCAL_MODEL = 2 };
@@ -41,5 +42,6 @@ struct bridge_command {
   uint16_t fade;         /* ... and is gone after so much more [ms] */
   uint32_t zero;
 };
+/* NOLINTEND(readability-identifier-naming) */
 
 #endif
