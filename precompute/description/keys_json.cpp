@@ -20,9 +20,10 @@ Json tables_json() {
   Json all = Json::array();
   for (const KeyTable& table : key_tables()) {
     Json keys = Json::array();
-    for (const ModelKey& key : table.keys)
+    for (const ModelKey& key : table.keys) {
       keys.push_back(
           {{"key", key.key}, {"unit", key.unit}, {"otherwise", key.otherwise}, {"meaning", key.meaning}});
+    }
     all.push_back({{"title", table.title}, {"keys", std::move(keys)}});
   }
   return all;

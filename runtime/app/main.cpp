@@ -283,11 +283,12 @@ int view_files(const std::vector<std::filesystem::path>& files, const ViewerOpti
 /// Settings and bounds of safety, with units and defaults apart from their meanings.
 nlohmann::ordered_json number_tables() {
   nlohmann::ordered_json settings = nlohmann::ordered_json::array(), safety = settings;
-  for (const Setting& setting : settings_table())
+  for (const Setting& setting : settings_table()) {
     settings.push_back({{"name", setting.name},
                         {"unit", setting.unit},
                         {"otherwise", setting.otherwise},
                         {"meaning", setting.meaning}});
+  }
   for_each_safety_field(SafetyOptions{}, [&](const SafetyField& field, const auto& number) {
     safety.push_back({{"name", field.name},
                       {"otherwise", number},

@@ -19,7 +19,8 @@ constexpr std::int64_t block = 8192;  // ticks that are written at once
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
 
 template <class T>
-void write(hdf5::File& file, const char* name, std::vector<std::int64_t> dims, const std::vector<T>& values) {
+void write(hdf5::File& file, const char* name, const std::vector<std::int64_t>& dims,
+           const std::vector<T>& values) {
   file.write(name, hdf5::element_type<T>(), dims, values.data());
 }
 
