@@ -16,7 +16,7 @@ void put_method(Model& model, const std::vector<std::int32_t>& values);
 /// group. The method comes before what it decides: the model may be the one that the visitor fills.
 template <class Visitor>
 void for_each_dynamics_field(const Model& model, Visitor&& visit) {
-  using Bytes = std::vector<std::uint8_t>;
+  using Octets = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
   using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
@@ -30,8 +30,8 @@ void for_each_dynamics_field(const Model& model, Visitor&& visit) {
   visit(
       Field<std::uint8_t>{"/dynamics/lumped",
                           {one},
-                          [](const Model& m) { return Bytes{static_cast<std::uint8_t>(m.dynamics.lumped)}; },
-                          [](Model& m, const Bytes& v) { m.dynamics.lumped = v[0] != 0; },
+                          [](const Model& m) { return Octets{static_cast<std::uint8_t>(m.dynamics.lumped)}; },
+                          [](Model& m, const Octets& v) { m.dynamics.lumped = v[0] != 0; },
                           {Count::one, 2, 0}});
   visit(Field<double>{"/dynamics/newmark", {{Count::one, 3, 0}}, newmark_of, put_newmark});
   visit(Field<double>{

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "formats/contents.h"
 
 namespace palpate {
 namespace {
@@ -140,6 +141,7 @@ using namespace std::string_view_literals;
 constexpr std::array magics = {
     Magic{".png", 0, "\x89PNG\r\n\x1a\n"},
     Magic{".h5", 0, "\x89HDF\r\n\x1a\n"},
+    Magic{".h5", 0, index_magic},
     Magic{".mcap", 0, "\x89MCAP0\r\n"},
     Magic{".jpg", 0, "\xff\xd8\xff"},
     Magic{".tif", 0, "II*\0"sv},

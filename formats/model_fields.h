@@ -157,7 +157,7 @@ void for_each_attribute(Visitor&& visit) {
 /// Datasets of the mesh of a body made of `element`.
 template <class Visitor>
 void for_each_mesh_field(ElementType element, Visitor&& visit) {
-  using Bytes = std::vector<std::uint8_t>;
+  using Octets = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
   using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
@@ -179,8 +179,8 @@ void for_each_mesh_field(ElementType element, Visitor&& visit) {
   visit(Field<std::uint8_t>{"/mesh/types",
                             {elements},
                             [](const Model& m) {
-                              return Bytes(static_cast<std::size_t>(m.mesh.elements()),
-                                           traits(m.mesh.element).vtk);
+                              return Octets(static_cast<std::size_t>(m.mesh.elements()),
+                                            traits(m.mesh.element).vtk);
                             },
                             nullptr});
   visit(Field<std::int32_t>{"/mesh/regions",
@@ -218,7 +218,7 @@ void for_each_vtk_field(Visitor&& visit) {
 /// limits are set by those above it.
 template <class Visitor>
 void for_each_body_field(ElementType element, Visitor&& visit) {
-  using Bytes = std::vector<std::uint8_t>;
+  using Octets = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
   using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
@@ -230,7 +230,7 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
   visit(Field<std::uint8_t>{"/dofs/fixed",
                             {nodes},
                             [](const Model& m) { return m.fixed; },
-                            [](Model& m, const Bytes& v) { m.fixed = v; },
+                            [](Model& m, const Octets& v) { m.fixed = v; },
                             {Count::one, std::int64_t{1} << kind.dimension, 0}});
   visit(Field<std::int32_t>{"/dofs/stored_nodes",
                             {{Count::stored_nodes}},
@@ -266,8 +266,8 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
       {Count::elements, kind.edges, 1}});  // every kind has as many angles as edges
   visit(Field<std::uint8_t>{"/model_toml",
                             {{Count::bytes_of_text}},
-                            [](const Model& m) { return Bytes(m.model_toml.begin(), m.model_toml.end()); },
-                            [](Model& m, const Bytes& v) { m.model_toml.assign(v.begin(), v.end()); }});
+                            [](const Model& m) { return Octets(m.model_toml.begin(), m.model_toml.end()); },
+                            [](Model& m, const Octets& v) { m.model_toml.assign(v.begin(), v.end()); }});
   visit(Field<std::uint8_t>{
       "/provenance/sources", {{Count::bytes_of_sources}}, sources_text, put_sources_text});
   for_each_vtk_field(visit);

@@ -15,44 +15,21 @@
 #include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
+#include "formats/contents.h"
 #include "formats/dynamics_fields.h"
-#include "formats/hdf5_contents.h"
 #include "formats/hierarchical_fields.h"
 #include "formats/mcap/records.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
-#include "formats/superblock.h"
 
 namespace palpate {
 namespace {
 
-constexpr const char* precompute_again =
-    "Copy the file again, or precompute it again: palpate-precompute model.toml";
-
-constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-precompute has written";
-
-/// Proves that this is our format in a version that we read.
-std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
-  const std::string where = file.path().string();
-  const auto format = file.text_attribute("/", "format");
-  if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
-  const auto version = file.integer_attribute("/", "version", 2);
-  if (!version) refuse(where, "the attribute version is missing");
-  if ((*version)[0] != format_major) {
-    throw Error("the file has format version " + std::to_string((*version)[0]) + "." +
-                    std::to_string((*version)[1]) + ", this program reads version " +
-                    std::to_string(format_major) + ".x",
-                where, "Precompute it again with this program's palpate-precompute");
-  }
-  if ((*version)[1] < 0) refuse(where, "the attribute version is negative");
-  return *version;
-}
-
 class Reader {
  public:
-  Reader(const hdf5::Contents& file, const LoadOptions& options)
+  Reader(const Contents& file, const LoadOptions& options)
       : file_(file), options_(options), where_(file.path().string()), counts_(where_) {}
 
   Model read();
@@ -69,15 +46,15 @@ class Reader {
   [[nodiscard]] PackedGreens read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth);
   void read_compressed();
   void check_diagonal(const std::string& path, std::int64_t i, double entry) const;
-  [[nodiscard]] std::shared_ptr<const void> read_scalars(const std::string& path, const hdf5::Stored& stored,
+  [[nodiscard]] std::shared_ptr<const void> read_scalars(const std::string& path, const Stored& stored,
                                                          bool single);
-  [[nodiscard]] std::shared_ptr<std::byte> room_for(const hdf5::Stored& packed) const;
+  [[nodiscard]] std::shared_ptr<std::byte> room_for(const Stored& packed) const;
   void check_content(const std::vector<std::int64_t>& version);
   void check_stored_checksum(const std::string& path, const std::string& found);
   template <class T>
   ChunkedChecksum::Inspect first_not_finite(std::atomic<std::size_t>& first) const;
 
-  const hdf5::Contents& file_;
+  const Contents& file_;
   LoadOptions options_;
   std::string where_;
   Counts counts_;
@@ -87,7 +64,7 @@ class Reader {
 };
 
 Model Reader::read() {
-  const std::vector<std::int64_t> version = read_version(file_);
+  const std::vector<std::int64_t> version = format_version(file_);
   read_known();
   for_each_probe_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
   check_model(model_, where_);
@@ -106,13 +83,13 @@ Model Reader::read() {
 }
 
 BegunModel Reader::read_begun() {
-  read_version(file_);
+  format_version(file_);
   read_known();
   return {std::move(model_), header_.precision, file_.has(greens_path)};
 }
 
 Model Reader::read_outline() {
-  read_version(file_);
+  format_version(file_);
   read_body();
   return std::move(model_);
 }
@@ -166,7 +143,7 @@ void Reader::read_attribute(const Attribute<T>& attribute) {
 
 template <class T>
 void Reader::read_field(const Field<T>& field) {
-  const hdf5::Stored stored = file_.locate(field.path, hdf5::element_type<T>(), field.shape.size());
+  const Stored stored = file_.locate(field.path, number_type<T>(), field.shape.size());
   counts_.match(field.path, field.shape, stored.dims);
 
   std::vector<T> values(static_cast<std::size_t>(stored.bytes) / sizeof(T));
@@ -219,7 +196,7 @@ ChunkedChecksum::Inspect Reader::first_not_finite(std::atomic<std::size_t>& firs
 }
 
 /// Memory for a packed matrix; null where it takes too much.
-std::shared_ptr<std::byte> Reader::room_for(const hdf5::Stored& packed) const {
+std::shared_ptr<std::byte> Reader::room_for(const Stored& packed) const {
   const std::int64_t most = options_.most_in_memory < 0 ? available_memory() / 2 : options_.most_in_memory;
   const std::shared_ptr<void> memory = packed.bytes <= most ? map_memory(packed.bytes) : nullptr;
   return {memory, static_cast<std::byte*>(memory.get())};
@@ -235,8 +212,7 @@ void Reader::check_diagonal(const std::string& path, std::int64_t i, double entr
 }
 
 /// Reads or maps an array of float or double and proves its checksum and that all is finite.
-std::shared_ptr<const void> Reader::read_scalars(const std::string& path, const hdf5::Stored& stored,
-                                                 bool single) {
+std::shared_ptr<const void> Reader::read_scalars(const std::string& path, const Stored& stored, bool single) {
   if (stored.offset % (single ? 4 : 8) != 0)
     refuse(where_, path + " does not start at a multiple of its scalar's size");
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
@@ -262,7 +238,7 @@ void Reader::read_compressed() {
   HierarchicalMatrix& matrix = compressed_to_fill(model_);
   matrix.index();
   for (const CompressedArray& array : compressed_arrays) {
-    const hdf5::Stored stored = file_.locate(array.path, hdf5::element_type<float>(), 1);
+    const Stored stored = file_.locate(array.path, number_type<float>(), 1);
     if (const std::int64_t entries = (matrix.*array.at).back(); stored.dims[0] != entries)
       refuse(where_, std::string(array.path) + " has " + std::to_string(stored.dims[0]) + " entries, " +
                          std::to_string(entries) + " are expected by pairs and ranks");
@@ -284,8 +260,7 @@ void Reader::read_compressed() {
 PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
   const std::int64_t order = model_.stored_dofs();
   const bool single = has_float_entries(header_.precision);
-  const hdf5::Stored stored =
-      file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
+  const Stored stored = file_.locate(path, single ? number_type<float>() : number_type<double>(), 1);
   if (stored.dims[0] != packed_size(order))
     refuse(where_, path + " has " + std::to_string(stored.dims[0]) + " entries, " +
                        std::to_string(packed_size(order)) + " are expected by /dofs/stored_nodes");
@@ -309,11 +284,28 @@ void Reader::check_content(const std::vector<std::int64_t>& version) {
 
 }  // namespace
 
+std::vector<std::int64_t> format_version(const Contents& file) {
+  const std::string where = file.path().string();
+  if (file.text_attribute("/", "format") != "palpate")
+    throw Error("is not a Palpate file with a model", where,
+                "Give a NAME.palpate.hdf that palpate-precompute has written");
+  const auto version = file.integer_attribute("/", "version", 2);
+  if (!version) refuse(where, "the attribute version is missing");
+  if ((*version)[0] != format_major) {
+    throw Error("the file has format version " + std::to_string((*version)[0]) + "." +
+                    std::to_string((*version)[1]) + ", this program reads version " +
+                    std::to_string(format_major) + ".x",
+                where, "Precompute it again with this program's palpate-precompute");
+  }
+  if ((*version)[1] < 0) refuse(where, "the attribute version is negative");
+  return *version;
+}
+
 std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial) {
   std::error_code missing;
   if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(partial, missing))) return {};
   try {
-    return Reader(hdf5::Contents::read(partial), {}).read_begun();
+    return Reader(Contents::read(partial), {}).read_begun();
   } catch (const Error&) {
     return {};  // it is begun anew
   }
@@ -321,7 +313,7 @@ std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial)
 
 namespace {
 
-hdf5::Contents contents_of(const std::filesystem::path& path) {
+Contents contents_of(const std::filesystem::path& path) {
   FileDescriptor bytes = open_file(path, OpenMode::read);
   std::string start(mcap::magic.size(), '\0');
   start.resize(read_some(bytes, std::as_writable_bytes(std::span(start)), 0));
@@ -329,8 +321,7 @@ hdf5::Contents contents_of(const std::filesystem::path& path) {
     throw Error(
         "is a recording, not a model", path.string(),
         "palpate-runtime view " + shell_word(path.string()) + " shows it; a model is a NAME.palpate.hdf");
-  check_superblock(bytes, {"a Palpate file", give_a_model, precompute_again});
-  return hdf5::Contents::read(std::move(bytes));
+  return Contents::read(std::move(bytes));
 }
 
 }  // namespace

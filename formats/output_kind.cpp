@@ -10,7 +10,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "formats/hdf5_contents.h"
+#include "formats/contents.h"
 #include "formats/mcap/reader.h"
 #include "formats/recording_messages.h"
 
@@ -31,10 +31,10 @@ std::optional<std::string> first_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-/// The attribute `format` of an HDF5 file, which may be a stranger's.
-std::string hdf5_format(const std::filesystem::path& file) {
+/// The attribute `format` of a file with an index.
+std::string indexed_format(const std::filesystem::path& file) {
   try {
-    return hdf5::Contents::read(file).text_attribute("/", "format").value_or("");
+    return Contents::read(file).text_attribute("/", "format").value_or("");
   } catch (const Error&) {
     return "";
   }
@@ -133,8 +133,8 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
   switch (kind) {
     case OutputKind::model:
     case OutputKind::hdf5:
-      return text.starts_with("\x89HDF\r\n\x1a\n") &&
-             hdf5_format(file) == (kind == OutputKind::model ? "palpate" : "palpate-recording");
+      return text.starts_with(index_magic) &&
+             indexed_format(file) == (kind == OutputKind::model ? "palpate" : "palpate-recording");
     case OutputKind::recording:
       return text.starts_with("\x89MCAP0\r\n") && contains(text, "palpate-recording");
     case OutputKind::frames:

@@ -43,8 +43,7 @@ inline constexpr std::string_view ticks_header =
 [[nodiscard]] bool needs_regular_file(OutputKind kind) noexcept;
 
 /// Whether a regular file is of this kind and ours, which replacing it loses nothing of anyone else's; an
-/// empty one is. By its content; HDF5 reads it in a child process, which it cannot take down with it. False
-/// for what cannot be read.
+/// empty one is. By its content. False for what cannot be read.
 [[nodiscard]] bool is_ours(const std::filesystem::path& file, OutputKind kind);
 
 /// Whether a recording of ours holds ticks, which no other run makes again. True for one that is damaged.

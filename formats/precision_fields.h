@@ -28,7 +28,7 @@ void for_each_smooth_field(const Model& model, Visitor&& visit) {
   }
 }
 
-/// What was measured of Xi; not in files before format 3.3.
+/// What was measured of Xi.
 template <class Visitor>
 void visit_greens_errors(Visitor&& visit) {
   visit(Field<double>{greens_errors_path,

@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/write_file.h"
-#include "formats/hdf5_contents.h"
+#include "formats/contents.h"
 #include "formats/mcap/reader.h"
 #include "formats/mcap/writer.h"
 #include "formats/recording_messages.h"
@@ -52,9 +52,9 @@ constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  //
 constexpr std::int64_t highest_rate = 1'000'000;                              // ticks a second
 constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 
-/// Says what an HDF5 file is: models are, and what is exported of recordings.
-[[noreturn]] void refuse_hdf5(const std::filesystem::path& path) {
-  const std::string format = hdf5::Contents::read(path).text_attribute("/", "format").value_or("");
+/// Says what a file with an index is: models are, and what is exported of recordings.
+[[noreturn]] void refuse_indexed(const std::filesystem::path& path) {
+  const std::string format = Contents::read(path).text_attribute("/", "format").value_or("");
   if (format == "palpate")
     throw Error(
         "is a model, not a recording", path.string(),
@@ -68,7 +68,7 @@ constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 mcap::Layout layout_of(const FileDescriptor& file) {
   std::string start(mcap::magic.size(), '\0');
   start.resize(read_some(file, std::as_writable_bytes(std::span(start)), 0));
-  if (start.starts_with("\x89HDF")) refuse_hdf5(file.path());
+  if (start == index_magic) refuse_indexed(file.path());
   if (start != mcap::magic) throw Error("is not a recording", file.path().string(), give_another);
   return mcap::read_layout(file);
 }

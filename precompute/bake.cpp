@@ -21,6 +21,7 @@
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/outputs/part_files.h"
+#include "formats/writer/model_writer.h"
 #include "meshes/quality.h"
 #include "precompute/columns.h"
 #include "precompute/compressed_greens.h"

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "formats/model_file.h"
+#include "formats/writer/model_writer.h"
 #include "precompute/numerics/greens_solver.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"

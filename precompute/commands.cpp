@@ -14,6 +14,7 @@
 #include "base/program.h"
 #include "base/spelling.h"
 #include "formats/model_file.h"
+#include "formats/writer/add_index.h"
 #include "precompute/bake.h"
 #include "precompute/bake_report.h"
 #include "precompute/compare.h"
@@ -279,6 +280,20 @@ CLI::App* add_compare(CLI::App& app, Arguments& arguments) {
   return command;
 }
 
+CLI::App* add_index_command(CLI::App& app, Arguments& arguments) {
+  CLI::App* command =
+      app.add_subcommand("index", "put the index, by which files are read, in front of a file's HDF5");
+  command->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
+  command->footer(
+      "For a model whose index is missing, as h5repack leaves it out, or wrong, as another program\n"
+      "has changed the HDF5. The file is written anew, whole or not at all.\n"
+      "Example:\n"
+      "  palpate-precompute index cube.palpate.hdf");
+  return command;
+}
+
 /// What to do instead, where a usage error shows it.
 std::string usage_hint(const CLI::App& app, const std::string& first_word) {
   const bool of_help = app.got_subcommand("help");
@@ -286,7 +301,7 @@ std::string usage_hint(const CLI::App& app, const std::string& first_word) {
     return "See palpate-precompute " + app.get_subcommands().front()->get_name() + " --help";
   }
   if (of_help) return "See palpate-precompute --help";
-  const auto command = meant(first_word, {"new", "join", "inspect", "verify", "compare", "help"});
+  const auto command = meant(first_word, {"new", "join", "inspect", "verify", "compare", "index", "help"});
   if (command && !std::filesystem::exists(first_word))
     return "Did you mean palpate-precompute " + *command + "? See palpate-precompute --help";
   return "See palpate-precompute --help";
@@ -309,6 +324,7 @@ int run_commands(int argc, char** argv) {
   const CLI::App* inspect_command = add_inspect(app, arguments);
   const CLI::App* verify_command = add_verify(app, arguments);
   const CLI::App* compare_command = add_compare(app, arguments);
+  const CLI::App* index_command = add_index_command(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
   if (asks_for_json(argc, argv)) return print_help_json(app, {{"model", keys_json()}});
   try {
@@ -319,8 +335,9 @@ int run_commands(int argc, char** argv) {
     }
     if (app.get_subcommands().empty() && arguments.model.empty())
       throw CLI::RequiredError(
-          "MODEL.toml, `new`, `join MODEL.toml`, `inspect FILE`, `verify FILE` or `compare A B`");
-    if (const auto command = meant(arguments.model, {"new", "join", "inspect", "verify", "compare"});
+          "MODEL.toml, `new`, `join MODEL.toml`, `inspect FILE`, `verify FILE`, `compare A B` or `index "
+          "FILE`");
+    if (const auto command = meant(arguments.model, {"new", "join", "inspect", "verify", "compare", "index"});
         command && !std::filesystem::exists(arguments.model))
       throw CLI::ParseError("there is no command '" + arguments.model + "' and no such file",
                             CLI::ExitCodes::ExtrasError);
@@ -334,6 +351,10 @@ int run_commands(int argc, char** argv) {
     return exit_ok;
   }
   if (compare_command->parsed()) return run_compare(arguments.file, arguments.other_file, arguments.compare);
+  if (index_command->parsed()) {
+    add_index(arguments.file);
+    return exit_ok;
+  }
   if (verify_command->parsed()) return run_verify(arguments.file);
   if (new_command->parsed()) return run_new(arguments.file, arguments.draft);
   arguments.bake.part = read_part_number(arguments.part);

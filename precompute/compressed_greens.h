@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "formats/model.h"
-#include "formats/model_file.h"
+#include "formats/writer/model_writer.h"
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/compression.h"
 #include "precompute/description/description.h"

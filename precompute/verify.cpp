@@ -11,6 +11,7 @@
 #include "base/printable.h"
 #include "formats/model_check.h"
 #include "formats/model_file.h"
+#include "formats/writer/add_index.h"
 #include "precompute/machine/blas_room.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/numerics/dynamics.h"
@@ -211,6 +212,15 @@ Check check_warp_study(const Model& model) {
   return check;
 }
 
+/// What the file has that is neither what its description nor what its HDF5 says.
+std::vector<std::string> differences_of(const Model& model, const std::filesystem::path& file) {
+  std::vector<std::string> differences = description_differences(model, file);
+  if (!is_index_right(file))
+    differences.push_back("the file's index does not say what its HDF5 says; palpate-precompute index " +
+                          shell_word(file.string()) + " writes it anew");
+  return differences;
+}
+
 }  // namespace
 
 bool VerifyReport::passed() const noexcept {
@@ -221,7 +231,7 @@ bool VerifyReport::passed() const noexcept {
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples) {
   if (model.scope == Scope::none) {
     VerifyReport report;
-    report.differences = description_differences(model, file);
+    report.differences = differences_of(model, file);
     report.stale = stale_sources(model, file);
     return report;
   }
@@ -255,7 +265,7 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
     }
   }
   if (const std::string warning = rest_warning(model); !warning.empty()) report.warnings.push_back(warning);
-  report.differences = description_differences(model, file);
+  report.differences = differences_of(model, file);
   report.stale = stale_sources(model, file);
   return report;
 }

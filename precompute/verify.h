@@ -12,7 +12,7 @@ namespace palpate {
 
 struct VerifyReport {
   std::vector<Check> checks;
-  std::vector<std::string> differences;  ///< fields that are not what /model_toml says
+  std::vector<std::string> differences;  ///< fields that are not what /model_toml says; a wrong index
   std::vector<std::string> stale;        ///< sources that have changed since
   std::vector<std::string> warnings;     ///< of what is as it was baked, but not good
   [[nodiscard]] bool passed() const noexcept;
@@ -29,7 +29,8 @@ struct VerifyReport {
 /// - of dynamics: see verify_dynamics;
 /// - a study of warping against a new one under the same forces: the largest difference of rotations and
 /// errors;
-/// - all fields that follow from /model_toml and the mesh: see description_differences.
+/// - all fields that follow from /model_toml and the mesh: see description_differences;
+/// - the index against the metadata of HDF5: see is_index_right.
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples = 12);
 
 /// The report as lines of text.

@@ -1,6 +1,7 @@
-"""Kinds of scripts/fuzz-programs: model files whose HDF5 metadata is damaged, and recordings, both with checksums that are right again, so that
+"""Kinds of scripts/fuzz-programs: model files whose index or HDF5 metadata is damaged, and recordings, with checksums that are right again, so that
 what is behind them is met."""
 
+import ctypes
 import functools
 import os
 import pathlib
@@ -157,7 +158,41 @@ def cached_pieces(data):
     return pieces_of(data)
 
 
+INDEX = 32768  # bytes of a file before its HDF5
+
+
+class Hash128(ctypes.Structure):
+    _fields_ = [("low", ctypes.c_uint64), ("high", ctypes.c_uint64)]
+
+
+def xxh3(data):
+    function = ctypes.CDLL("libxxhash.so.0").XXH3_128bits
+    function.restype, function.argtypes = Hash128, [ctypes.c_char_p, ctypes.c_size_t]
+    found = function(data, len(data))
+    return f"{found.high:016x}{found.low:016x}".encode()
+
+
+def damage_index(rng, whole):
+    """docs/file-format.md says what stands where."""
+    data = bytearray(whole)
+    length = struct.unpack_from("<Q", data, 16)[0]
+    for _ in range(rng.choice([1, 1, 2, 3])):
+        at = rng.randrange(56, length)
+        if rng.randrange(3) == 0:
+            data[at] ^= 1 << rng.randrange(8)
+        else:
+            at -= (at - 56) % rng.choice([1, 4, 8])
+            number = rng.choice(NUMBERS) if rng.randrange(3) else int.from_bytes(data[at : at + 8], "little") + rng.choice([-1, 1, 8, -8, 64])
+            data[at : at + 8] = (number % (1 << 64)).to_bytes(8, "little")
+    if rng.randrange(20) == 0:
+        struct.pack_into("<Q", data, 16, rng.choice(NUMBERS))
+    length = min(struct.unpack_from("<Q", data, 16)[0], INDEX)
+    data[24:56] = xxh3(bytes(data[56:length]))
+    return bytes(data)
+
+
 def damage_metadata(rng, whole):
+    index, whole = whole[:INDEX], whole[INDEX:]
     pieces = cached_pieces(whole)
     data = bytearray(whole)
     for _ in range(rng.choice([1, 1, 1, 2, 3])):
@@ -186,7 +221,7 @@ def damage_metadata(rng, whole):
             data[at : min(at + size, piece.end)] = number.to_bytes(size, "little")[: piece.end - at]
         if rng.randrange(20):
             piece.seal(data)
-    return bytes(data)
+    return index + bytes(data)
 
 
 def say(*command, cwd):
@@ -221,7 +256,7 @@ class Kind:
         return self.files()
 
     def damage(self, rng, seed):
-        return seed, damage_metadata(rng, whole_files()[seed])
+        return seed, rng.choice([damage_index, damage_metadata])(rng, whole_files()[seed])
 
     def write(self, folder, rng, data):
         damaged, data = data
@@ -243,7 +278,7 @@ class Model(Kind):
 
     @staticmethod
     def commands():
-        return [[PRECOMPUTE, "inspect", "cube.palpate.hdf"], [PRECOMPUTE, "verify", "cube.palpate.hdf"],
+        return [[PRECOMPUTE, "inspect", "cube.palpate.hdf"], [PRECOMPUTE, "verify", "cube.palpate.hdf"], [PRECOMPUTE, "index", "cube.palpate.hdf"],
                 [RUNTIME, "probe", "cube.palpate.hdf", "--at", "0.5,0.5,1", "--displace", "0,0,-0.1"],
                 [RUNTIME, "play", "cube.palpate.hdf", *TOOL, "--device", "script:touch.csv", "--fast", "--report", "report.json"]]
 

@@ -3,20 +3,24 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "base/file_io.h"
 #include "base/json_text.h"
 #include "base/program.h"
 #include "base/words.h"
 #include "base/write_file.h"
+#include "formats/contents.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/recording.h"
 #include "runtime/app/session_pictures.h"
@@ -25,6 +29,7 @@
 #include "runtime/exports/session_xdmf.h"
 #include "runtime/exports/ticks_table.h"
 #include "runtime/loop/session_check.h"
+#include "runtime/push/other_program.h"
 #include "runtime/scene/seen_surface.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
@@ -224,16 +229,50 @@ void write_scene(const Chosen& chosen, const ExportOptions& options, const std::
   tell(options.gltf, chosen, file.bytes());
 }
 
-/// Ticks and, where there are any, pictures, with their description.
+/// Writes a row into a dataset for which there is space.
+template <class T>
+void fill(const Contents& file, const std::string& dataset, std::size_t rank, std::int64_t row,
+          std::span<const T> values) {
+  const Stored space = file.locate(dataset, number_type<T>(), rank);
+  write_exactly(file.file(), std::as_bytes(values),
+                space.offset + row * static_cast<std::int64_t>(values.size_bytes()));
+}
+
+void fill_frame(const Contents& file, std::int64_t row, const SurfaceFrame& frame) {
+  fill<std::int64_t>(file, "/frames/tick", 1, row, std::array{frame.tick});
+  fill<double>(file, "/frames/time", 1, row, std::array{frame.time});
+  fill<float>(file, "/frames/displacement", 3, row, frame.displacement);
+  fill<float>(file, "/frames/von_mises", 2, row, frame.von_mises);
+  fill<float>(file, "/frames/pressure", 2, row, frame.pressure);
+}
+
+/// Ticks and, where there are any, pictures, with their description. The HDF5 library, and what Debian's
+/// brings with it, is in a program of its own, which leaves space for the pictures.
 void write_numbers(const RecordingFile& recording, SessionPictures* pictures, const ExportOptions& options,
                    const std::filesystem::path& hdf5) {
   const TickRange ticks = choose_ticks(recording, options);
   std::vector<std::int64_t> frames;
   if (pictures != nullptr)
     frames = choose(*pictures, options, options.fps.value_or(std::numeric_limits<double>::infinity()));
-  write_hdf5(hdf5, recording, ticks, frames, [&](std::int64_t k) { return pictures->picture(k).frame; });
+  TemporaryFile made(hdf5);
+  const ProgramEnd end =
+      run_other_program(find_program("palpate-export-hdf5"),
+                        {options.recording.string(), made.path().string(), std::to_string(ticks.begin),
+                         std::to_string(ticks.end), std::to_string(frames.size())});
+  if (end.status != exit_ok)
+    throw Error(fmt::format("palpate-export-hdf5 ended with status {}", end.status), hdf5.string(),
+                "see what it says above");
+  const Contents file = Contents::read(open_file(made.path(), OpenMode::write));
   std::vector<double> times;
-  for (const std::int64_t k : frames) times.push_back(pictures->time(k));
+  for (const std::int64_t k : frames) {
+    SurfaceFrame frame = pictures->picture(k).frame;
+    const PictureTime& taken = recording.pictures()[static_cast<std::size_t>(k)];
+    frame.tick = taken.tick;
+    frame.time = taken.time;
+    fill_frame(file, std::ssize(times), frame);
+    times.push_back(taken.time);
+  }
+  made.take_its_place();
   if (frames.empty()) {
     std::filesystem::remove(xdmf_path(hdf5));  // of an earlier one
   } else {

@@ -9,12 +9,11 @@ namespace palpate {
 /// What of a recording is written, and where; files that are not asked for are empty.
 struct ExportOptions {
   std::filesystem::path recording;
-  std::filesystem::path html{};  ///< one page with the recording in it, which asks no network and no runtime
-  std::filesystem::path gltf{};  ///< the surface and the tool as an animation (glb_of)
-  std::filesystem::path vtu{};   ///< a collection (.pvd) of .vtu files in a folder beside it
-  std::filesystem::path csv{};   ///< the ticks (ticks_line)
-  std::filesystem::path
-      hdf5{};  ///< ticks and pictures (write_hdf5), with a description for ParaView beside it
+  std::filesystem::path html{};   ///< one page with the recording in it, which asks no network and no runtime
+  std::filesystem::path gltf{};   ///< the surface and the tool as an animation (glb_of)
+  std::filesystem::path vtu{};    ///< a collection (.pvd) of .vtu files in a folder beside it
+  std::filesystem::path csv{};    ///< the ticks (ticks_line)
+  std::filesystem::path hdf5{};   ///< ticks and pictures, with a description for ParaView beside it
   std::optional<double> fps{};    ///< pictures a second at most; else 30, and all into HDF5
   double from = 0.0;              ///< [s]
   std::optional<double> to = {};  ///< [s]; else to the end

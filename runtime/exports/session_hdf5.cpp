@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "base/write_file.h"
-#include "formats/hdf5.h"
+#include "formats/contents.h"
 #include "formats/recording_messages.h"
+#include "formats/writer/hdf5_file.h"
 
 namespace palpate {
 namespace {
@@ -21,7 +21,7 @@ constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns"
 template <class T>
 void write(hdf5::File& file, const char* name, const std::vector<std::int64_t>& dims,
            const std::vector<T>& values) {
-  file.write(name, hdf5::element_type<T>(), dims, values.data());
+  file.write(name, number_type<T>(), dims, values.data());
 }
 
 void write_head(hdf5::File& file, const RecordingFile& recording) {
@@ -48,7 +48,7 @@ void write_head(hdf5::File& file, const RecordingFile& recording) {
 /// A field of a tick as a dataset: /ticks/NAME, with a row of `components` numbers for each tick.
 struct TickColumn {
   std::string name;
-  hdf5::ElementType type;
+  NumberType type;
   std::int64_t components = 1;
   std::size_t offset = 0;  ///< of the numbers in TickRecord
 
@@ -82,7 +82,7 @@ class ColumnFinder {
   template <class T>
   void add(const std::string& name, const T* member, std::int64_t components) {
     const std::byte* at = reinterpret_cast<const std::byte*>(member);
-    columns.push_back({name, hdf5::element_type<T>(), components, static_cast<std::size_t>(at - begin_)});
+    columns.push_back({name, number_type<T>(), components, static_cast<std::size_t>(at - begin_)});
   }
 
   const std::byte* begin_;
@@ -114,43 +114,25 @@ void write_ticks(hdf5::File& file, const RecordingFile& recording, TickRange tic
   }
 }
 
-void write_frames(hdf5::File& file, const RecordingFile& recording, std::span<const std::int64_t> pictures,
-                  const std::function<SurfaceFrame(std::int64_t)>& frame) {
-  const std::int64_t F = std::ssize(pictures), S = std::ssize(recording.surface().nodes);
-  const hdf5::ElementType number = hdf5::element_type<float>();
-  std::vector<std::int64_t> ticks;
-  std::vector<double> times;
-  for (const std::int64_t k : pictures) {
-    const PictureTime& taken = recording.pictures()[static_cast<std::size_t>(k)];
-    ticks.push_back(taken.tick);
-    times.push_back(taken.time);
-  }
-  write(file, "/frames/tick", {F}, ticks);
-  write(file, "/frames/time", {F}, times);
-  file.write("/frames/displacement", number, std::array{F, S, std::int64_t{3}}, nullptr);
-  file.write("/frames/von_mises", number, std::array{F, S}, nullptr);
-  file.write("/frames/pressure", number, std::array{F, S}, nullptr);
-  for (std::int64_t row = 0; row < F; ++row) {
-    const SurfaceFrame shown = frame(pictures[static_cast<std::size_t>(row)]);
-    file.write_rows("/frames/displacement", number, row, 1, shown.displacement.data());
-    file.write_rows("/frames/von_mises", number, row, 1, shown.von_mises.data());
-    file.write_rows("/frames/pressure", number, row, 1, shown.pressure.data());
-  }
+void reserve_frames(hdf5::File& file, std::int64_t pictures, std::int64_t nodes) {
+  const NumberType number = number_type<float>();
+  file.write("/frames/tick", number_type<std::int64_t>(), std::array{pictures}, nullptr);
+  file.write("/frames/time", number_type<double>(), std::array{pictures}, nullptr);
+  file.write("/frames/displacement", number, std::array{pictures, nodes, std::int64_t{3}}, nullptr);
+  file.write("/frames/von_mises", number, std::array{pictures, nodes}, nullptr);
+  file.write("/frames/pressure", number, std::array{pictures, nodes}, nullptr);
 }
 
 }  // namespace
 
 void write_hdf5(const std::filesystem::path& file, const RecordingFile& recording, TickRange ticks,
-                std::span<const std::int64_t> pictures,
-                const std::function<SurfaceFrame(std::int64_t)>& frame) {
+                std::int64_t pictures) {
   const hdf5::Quiet quiet;
-  TemporaryFile temporary(file);
-  hdf5::File out = hdf5::File::create(temporary.path());
+  hdf5::File out = hdf5::File::create(file);
   write_head(out, recording);
   write_ticks(out, recording, ticks);
-  write_frames(out, recording, pictures, frame);
+  reserve_frames(out, pictures, std::ssize(recording.surface().nodes));
   out.close();
-  temporary.take_its_place();
 }
 
 }  // namespace palpate

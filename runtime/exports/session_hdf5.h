@@ -3,8 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <span>
 
 #include "formats/recording.h"
 
@@ -16,11 +14,10 @@ struct TickRange {
   std::int64_t end = 0;
 };
 
-/// Writes attributes, /ticks, /surface and /frames as docs/reference/recording-fields.md has them.
-/// `pictures`: those that are written, ascending; `frame` gives each, one after the other. Takes memory for
-/// some thousand ticks and one picture. Throws Error; then what stood at `file` is as it was.
+/// Writes attributes, /ticks, /surface and the space of /frames for `pictures` pictures, as
+/// docs/reference/recording-fields.md has them, into a file that is emptied. Takes memory for some thousand
+/// ticks. Throws Error.
 void write_hdf5(const std::filesystem::path& file, const RecordingFile& recording, TickRange ticks,
-                std::span<const std::int64_t> pictures,
-                const std::function<SurfaceFrame(std::int64_t)>& frame);
+                std::int64_t pictures);
 
 }  // namespace palpate

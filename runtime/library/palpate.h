@@ -94,8 +94,7 @@ const char* palpate_status_name(uint32_t bit) PALPATE_NOEXCEPT;
 
 /* Loads a baked file (NAME.palpate.hdf) and makes a session with `tool_count` tools and room for
  * `max_contacts` contact points of all tools together, 1 to 256 (32 suits a finger tip, 256 a hand). Takes
- * from a tenth of a second to seconds, and several threads for unfolding. The file's structure is looked at
- * by a child process, as crafted files crash the HDF5 library: forks once, and waits for that child alone.
+ * from a tenth of a second to seconds, and several threads for unfolding.
  *
  * Returns NULL where that cannot be done; `error`, unless NULL, then says why and what to do about it: a line
  * "error: ..." and a line "hint: ...", cut to `error_size` bytes with the zero at its end. It is empty where

@@ -1,6 +1,9 @@
 // Files that others wrote: what reading them does to the program, and what they do to it.
+#include "formats/contents.h"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/wait.h>
@@ -11,14 +14,18 @@
 #include <csignal>
 #include <cstring>
 #include <iterator>
+#include <random>
 #include <thread>
 
 #include "base/error.h"
 #include "base/file_io.h"
 #include "base/program.h"
-#include "formats/hdf5_contents.h"
+#include "formats/checksum.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
+#include "formats/writer/add_index.h"
+#include "formats/writer/hdf5_file.h"
+#include "formats/writer/hdf5_walk.h"
 #include "matrices/hierarchical_product.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
@@ -66,45 +73,245 @@ TEST(Contents, FindsWhatWasWritten) {
   const std::vector<double> values = {1, 2, 3, 4, 5, 6};
   {
     hdf5::File file = hdf5::File::create(folder / "a.h5");
-    file.write("/group/values", hdf5::element_type<double>(), std::array<std::int64_t, 2>{3, 2},
-               values.data());
+    file.write("/group/values", number_type<double>(), std::array<std::int64_t, 2>{3, 2}, values.data());
     file.make_link("/link", "/group/values");
     file.write_attribute("/group/values", "text", std::string("of a dataset"));
     file.write_attribute("/", "numbers", std::array<std::int64_t, 3>{7, -8, 9});
     file.close();
   }
-  const auto contents = hdf5::Contents::read(folder / "a.h5");
+  const auto contents = Contents::read(folder / "a.h5");
   EXPECT_TRUE(contents.has("/group"));
   EXPECT_FALSE(contents.has("/link")) << "a link is not the file's own";
   EXPECT_EQ(contents.text_attribute("/group/values", "text"), "of a dataset");
   EXPECT_EQ(contents.integer_attribute("/", "numbers", 3), (std::vector<std::int64_t>{7, -8, 9}));
   EXPECT_FALSE(contents.integer_attribute("/", "numbers", 2));
   EXPECT_FALSE(contents.text_attribute("/", "numbers"));
-  std::vector<double> rows(4);
-  contents.read_rows("/group/values", hdf5::element_type<double>(), 1, 2, rows.data());
-  EXPECT_EQ(rows, (std::vector<double>{3, 4, 5, 6}));
-  EXPECT_THROW(contents.read_rows("/group/values", hdf5::element_type<double>(), 2, 2, rows.data()), Error);
-  EXPECT_THROW(static_cast<void>(contents.locate("/group/values", hdf5::element_type<float>(), 2)), Error);
+  const Stored stored = contents.locate("/group/values", number_type<double>(), 2);
+  EXPECT_EQ(stored.dims, (std::vector<std::int64_t>{3, 2}));
+  ASSERT_EQ(stored.bytes, 48);
+  std::vector<double> read(6);
+  read_exactly(contents.file(), std::as_writable_bytes(std::span(read)), stored.offset);
+  EXPECT_EQ(read, values);
+  EXPECT_THROW(static_cast<void>(contents.locate("/group/values", number_type<float>(), 2)), Error);
+  EXPECT_THROW(static_cast<void>(contents.locate("/group/values", number_type<double>(), 1)), Error);
+  EXPECT_THROW(static_cast<void>(contents.locate("/group", number_type<double>(), 2)), Error);
 }
 
-TEST(Contents, OfAForeignFileHaveALimit) {
+/// A group and two datasets in a file of 40000 bytes.
+FileObjects some_objects() {
+  FileObjects objects;
+  objects["/"].attributes = {{"format", "palpate"}, {"version", std::vector<std::int64_t>{4, 0}}};
+  objects["/a"] = {.type = "float64", .dims = {3, 2}, .offset = 32'800, .bytes = 48};
+  objects["/b"] = {.type = "int32", .dims = {5}, .offset = 32'848, .bytes = 20};
+  objects["/c"] = {.type = "uint8", .dims = {0}};
+  return objects;
+}
+
+FileDescriptor file_with(const Folder& folder, std::span<const std::byte> index) {
+  std::string bytes(40'000, '\0');
+  std::memcpy(bytes.data(), index.data(), index.size());
+  write_bytes(folder / "a.h5", bytes);
+  return open_file(folder / "a.h5", OpenMode::read);
+}
+
+TEST(Index, SaysWhatWasSaid) {
+  const Folder folder;
+  const auto contents = Contents::read(file_with(folder, make_index(some_objects(), 40'000, "a")));
+  EXPECT_EQ(contents.text_attribute("/", "format"), "palpate");
+  EXPECT_EQ(contents.integer_attribute("/", "version", 2), (std::vector<std::int64_t>{4, 0}));
+  EXPECT_EQ(contents.locate("/b", number_type<std::int32_t>(), 1).offset, 32'848);
+  EXPECT_EQ(contents.locate("/c", number_type<std::uint8_t>(), 1).bytes, 0);
+}
+
+struct Lie {
+  const char* name;
+  void (*tell)(FileObjects&);
+  const char* says;
+};
+
+TEST(Index, ThatCannotBeIsRefused) {
+  const Lie lies[] = {
+      {"behind the end", [](FileObjects& o) { o["/a"].offset = 39'953; },
+       "/a (3 x 2) needs 48 bytes, more than"},
+      {"far behind", [](FileObjects& o) { o["/a"].offset = ~std::uint64_t{0}; }, "more than the file holds"},
+      {"on the index", [](FileObjects& o) { o["/a"].offset = 32'767; }, "/a lies on the file's index"},
+      {"on another", [](FileObjects& o) { o["/b"].offset = 32'847; }, "/b lies on /a"},
+      {"in another", [](FileObjects& o) { o["/b"].offset = 32'801; }, "/b lies on /a"},
+      {"at the same place", [](FileObjects& o) { o["/b"].offset = 32'800; }, " lies on /"},
+      {"too few bytes", [](FileObjects& o) { o["/a"].bytes = 40; }, "index is damaged"},
+      {"too many bytes", [](FileObjects& o) { o["/a"].bytes = 56; }, "index is damaged"},
+      {"bytes of nothing",
+       [](FileObjects& o) {
+         o["/c"] = {"uint8", {0}, 33'000, 1, {}};
+       },
+       "index is damaged"},
+      {"a place of nothing", [](FileObjects& o) { o["/c"].offset = 33'000; }, "index is damaged"},
+      {"a huge size",
+       [](FileObjects& o) {
+         o["/a"].dims = {~std::uint64_t{0}, 2};
+       },
+       "/a has impossible sizes"},
+      {"sizes that overflow",
+       [](FileObjects& o) {
+         o["/a"].dims = {1U << 31U, 1U << 30U};
+       },
+       "/a has impossible sizes"},
+      {"an unknown type", [](FileObjects& o) { o["/a"].type = "float65"; }, "index is damaged"},
+      {"a group with numbers", [](FileObjects& o) { o["/a"].type = ""; }, "index is damaged"},
+  };
+  for (const Lie& lie : lies) {
+    const Folder folder;
+    FileObjects objects = some_objects();
+    lie.tell(objects);
+    const std::string text =
+        refusal([&] { Contents::read(file_with(folder, make_index(objects, 40'000, "a"))); });
+    EXPECT_NE(text.find(lie.says), std::string::npos) << lie.name << ": " << text;
+  }
+}
+
+TEST(Index, ThatDoesNotFitIsNotMade) {
+  FileObjects objects;
+  for (int k = 0; k < 8; ++k) objects[fmt::format("/{}", k)].attributes["text"] = std::string(4096, 'x');
+  EXPECT_NE(refusal([&] { make_index(objects, 40'000, "a"); }).find("32768 are there"), std::string::npos);
+}
+
+/// docs/file-format.md: the number of bytes that the index takes, and its checksum's place.
+constexpr std::size_t length_at = 16, checksum_at = 24, content_at = 56;
+
+std::size_t length_of(std::span<const std::byte> index) {
+  std::uint64_t length = 0;
+  std::memcpy(&length, &index[length_at], sizeof length);
+  return length;
+}
+
+TEST(Index, IsNotBelievedWhereAByteIsAnother) {
+  const Folder folder;
+  const std::vector<std::byte> index = make_index(some_objects(), 40'000, "a");
+  for (std::size_t at = 0; at < length_of(index); ++at) {
+    std::vector<std::byte> altered = index;
+    altered[at] ^= std::byte{4};
+    EXPECT_NE(refusal([&] { Contents::read(file_with(folder, altered)); }), "") << at;
+  }
+}
+
+/// Whatever it says: what is found in the end lies in the file.
+TEST(Index, WithTheRightChecksumMaySayAnything) {
+  const Folder folder;
+  const std::vector<std::byte> index = make_index(some_objects(), 40'000, "a");
+  const std::size_t length = length_of(index);
+  write_bytes(folder / "a.h5", std::string(40'000, '\0'));
+  std::mt19937_64 random(5);
+  int read = 0;
+  for (int round = 0; round < 5000; ++round) {
+    std::vector<std::byte> altered = index;
+    for (std::uint64_t edits = 1 + random() % 3; edits > 0; --edits) {
+      const std::size_t at = content_at + random() % (length - content_at);
+      altered[at] =
+          random() % 2 == 0 ? altered[at] ^ std::byte(1U << random() % 8) : std::byte(random() % 256);
+    }
+    const std::string digits = checksum(std::span(altered).subspan(content_at, length - content_at));
+    std::memcpy(&altered[checksum_at], digits.data(), digits.size());
+    try {
+      const auto contents = Contents::of(open_file(folder / "a.h5", OpenMode::read), altered);
+      ++read;
+      if (!contents.has("/a")) continue;
+      const Stored stored = contents.locate("/a", number_type<double>(), 2);
+      EXPECT_GE(stored.offset, index_bytes);
+      EXPECT_LE(stored.offset + stored.bytes, 40'000);
+      EXPECT_EQ(stored.bytes, 8 * stored.dims[0] * stored.dims[1]);
+    } catch (const Error&) {
+    }
+  }
+  EXPECT_GT(read, 100);
+}
+
+TEST(Index, IsAddedToAModelThatHasNone) {
+  const Folder folder;
+  const std::filesystem::path file = folder / "a.palpate.hdf";
+  write_sample(file);
+  EXPECT_TRUE(is_index_right(file));
+  const std::string whole = read_bytes(file);
+  const std::string hdf5 = whole.substr(static_cast<std::size_t>(index_bytes));
+  write_bytes(file, hdf5);
+  const std::string text = refusal([&] { load_model(file); });
+  EXPECT_NE(text.find("not a Palpate file with an index"), std::string::npos) << text;
+  EXPECT_NE(text.find("palpate-precompute index " + file.string()), std::string::npos) << text;
+  add_index(file);
+  EXPECT_EQ(read_bytes(file), whole);
+  write_bytes(file, std::string(512, 'x') + hdf5);  // as others begin theirs
+  add_index(file);
+  EXPECT_EQ(read_bytes(file), whole);
+}
+
+TEST(Index, IsWrittenAnewWhereItIsWrong) {
+  const Folder folder;
+  const std::filesystem::path file = folder / "a.palpate.hdf";
+  write_sample(file);
+  const std::string whole = read_bytes(file);
+  FileObjects objects;
+  objects["/"].attributes["format"] = "palpate";
+  const std::vector<std::byte> wrong = make_index(objects, whole.size(), "a");
+  std::string bytes = whole;
+  std::memcpy(bytes.data(), wrong.data(), wrong.size());
+  write_bytes(file, bytes);
+  EXPECT_FALSE(is_index_right(file));
+  add_index(file);
+  EXPECT_TRUE(is_index_right(file));
+  EXPECT_EQ(read_bytes(file), whole);
+}
+
+TEST(Index, IsNotAddedToWhatIsNoModelOfThisVersion) {
+  const Folder folder;
+  const std::filesystem::path file = folder / "a.palpate.hdf";
+  write_sample(file);
+  set_integers(file, "version", {3, 6});
+  { hdf5::File::create(folder / "b.h5").close(); }
+  write_bytes(folder / "c.toml", "name = 1");
+  const auto expect_kept = [](const std::filesystem::path& path, const std::string& says) {
+    const std::string before = read_bytes(path), text = refusal([&] { add_index(path); });
+    EXPECT_NE(text.find(says), std::string::npos) << text;
+    EXPECT_NE(text.find(path.string() + " |"), std::string::npos) << text;
+    EXPECT_EQ(read_bytes(path), before);
+  };
+  expect_kept(file, "format version 3.6");
+  expect_kept(folder / "b.h5", "not a Palpate file with a model");
+  expect_kept(folder / "c.toml", "is not an HDF5 file");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()),
+                          std::filesystem::directory_iterator()),
+            3);
+}
+
+/// Changes of the process that only a fork makes.
+std::atomic<int> forks = 0;
+
+TEST(Contents, AreReadWithoutAnotherProcess) {
+  const Folder folder;
+  write_sample(folder / "a.palpate.hdf");
+  ASSERT_EQ(pthread_atfork([] { ++forks; }, nullptr, nullptr), 0);
+  const int before = forks;
+  load_model(folder / "a.palpate.hdf");
+  EXPECT_EQ(forks, before);
+  EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
+  EXPECT_EQ(forks, before + 1);
+}
+
+TEST(Walk, OfAForeignFileHasALimit) {
   const Folder folder;
   {
     hdf5::File file = hdf5::File::create(folder / "a.h5");
     for (int k = 0; k < 10'001; ++k) file.make_group(fmt::format("/{}", k));
-    file.close();
   }
-  const std::string text = refusal([&] { hdf5::Contents::read(folder / "a.h5"); });
+  const std::string text = refusal([&] { hdf5::index_of(open_file(folder / "a.h5", OpenMode::read)); });
   EXPECT_NE(text.find("more than 10000"), std::string::npos) << text;
 }
 
-TEST(Contents, AreReadInAHostThatCaresForItsChildrenItself) {
+TEST(Walk, GoesThroughInAHostThatCaresForItsChildrenItself) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
   const std::ptrdiff_t files = open_files();
   {
     const SignalAction ignored(SIGCHLD, SIG_IGN);  // children are reaped by the kernel
-    EXPECT_NO_THROW(load_model(folder / "a.palpate.hdf"));
+    EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
   }
   static std::atomic<int> ended;
   ended = 0;
@@ -112,21 +319,21 @@ TEST(Contents, AreReadInAHostThatCaresForItsChildrenItself) {
     const SignalAction handled(SIGCHLD, [](int) {
       while (waitpid(-1, nullptr, WNOHANG) > 0) ++ended;
     });
-    EXPECT_NO_THROW(load_model(folder / "a.palpate.hdf"));
+    EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
     struct sigaction now {};
     sigaction(SIGCHLD, nullptr, &now);
     EXPECT_NE(now.sa_handler, SIG_DFL);
   }
   const pid_t child = fork();
   if (child == 0) _exit(5);
-  EXPECT_NO_THROW(load_model(folder / "a.palpate.hdf"));
+  EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
   int status = 0;
   EXPECT_EQ(waitpid(child, &status, 0), child) << "the host's child is the host's";
   EXPECT_EQ(WEXITSTATUS(status), 5);
   EXPECT_EQ(open_files(), files);
 }
 
-TEST(Contents, AreReadInAHostWithThreadsAndTimers) {
+TEST(Walk, GoesThroughInAHostWithThreadsAndTimers) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
   std::atomic<bool> stop = false;
@@ -136,7 +343,7 @@ TEST(Contents, AreReadInAHostWithThreadsAndTimers) {
   const SignalAction handled(SIGALRM, [](int) {});
   const itimerval often = {{0, 2000}, {0, 2000}}, never = {};
   setitimer(ITIMER_REAL, &often, nullptr);
-  for (int k = 0; k < 10; ++k) EXPECT_NO_THROW(load_model(folder / "a.palpate.hdf"));
+  for (int k = 0; k < 10; ++k) EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
   setitimer(ITIMER_REAL, &never, nullptr);
   stop = true;
 }

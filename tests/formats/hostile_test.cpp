@@ -353,24 +353,24 @@ const Edit edits[] = {
     {"NoFormat", [](const Path& p) { remove_attribute(p, "/", "format"); }, {"not a Palpate file"}},
     {"NewerMajor",
      [](const Path& p) {
-       set_integers(p, "version", {4, 1});
+       set_integers(p, "version", {5, 1});
      },
-     {"format version 4.1", "reads version 3.x", "Precompute it again"}},
+     {"format version 5.1", "reads version 4.x", "Precompute it again"}},
     {"OlderMajor",
      [](const Path& p) {
-       set_integers(p, "version", {2, 0});
+       set_integers(p, "version", {3, 6});
      },
-     {"format version 2.0", "reads version 3.x", "Precompute it again"}},
+     {"format version 3.6", "reads version 4.x", "Precompute it again"}},
     {"NegativeMinor",
      [](const Path& p) {
-       set_integers(p, "version", {3, -1});
+       set_integers(p, "version", {4, -1});
      },
      {"version is negative"}},
     {"NoVersion",
      [](const Path& p) { remove_attribute(p, "/", "version"); },
      {"attribute version is missing"}},
     {"VersionOfOneNumber",
-     [](const Path& p) { set_integers(p, "version", {3}); },
+     [](const Path& p) { set_integers(p, "version", {4}); },
      {"attribute version is missing"}},
     {"NoName", [](const Path& p) { remove_attribute(p, "/", "name"); }, {"attribute name is missing"}},
     {"NumberAsName", [](const Path& p) { set_integers(p, "name", {1}); }, {"attribute name is missing"}},
@@ -607,33 +607,31 @@ TEST(AlteredFile, AttributesAreNoticed) {
             std::string::npos);
 }
 
-TEST(OlderMinorVersion, HasNoOverlays) {
+TEST(FileWithout, Overlays) {
   const Folder folder;
   std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  set_integers(folder / "x.hdf", "version", {3, 0});
   remove_object(folder / "x.hdf", "/overlay");
   EXPECT_NE(refusal([&] { load_model(folder / "x.hdf"); }).find("content_hash"), std::string::npos);
   reseal(folder / "x.hdf");
-  const Model old = load_model(folder / "x.hdf");
-  EXPECT_EQ(old.overlay.refinement, 0);
-  EXPECT_EQ(difference(load_model(good_file()), old), "overlay");
+  const Model read = load_model(folder / "x.hdf");
+  EXPECT_EQ(read.overlay.refinement, 0);
+  EXPECT_EQ(difference(load_model(good_file()), read), "overlay");
 }
 
-TEST(OlderMinorVersion, HasNoStudyOfWarping) {
+TEST(FileWithout, StudyOfWarping) {
   const Folder folder;
   std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  set_integers(folder / "x.hdf", "version", {3, 5});
   remove_object(folder / "x.hdf", "/warp");
   reseal(folder / "x.hdf");
-  const Model old = load_model(folder / "x.hdf");
-  EXPECT_FALSE(old.warp.any());
-  EXPECT_EQ(difference(load_model(good_file()), old), "warp");
+  const Model read = load_model(folder / "x.hdf");
+  EXPECT_FALSE(read.warp.any());
+  EXPECT_EQ(difference(load_model(good_file()), read), "warp");
 }
 
 TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {
   const Folder folder;
   std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  set_integers(folder / "x.hdf", "version", {3, 7});
+  set_integers(folder / "x.hdf", "version", {4, 1});
   replace(folder / "x.hdf", "/mesh/colours", H5T_STD_U8LE, {27});
   reseal(folder / "x.hdf");
   EXPECT_EQ(difference(load_model(good_file()), load_model(folder / "x.hdf")), "");
@@ -641,7 +639,8 @@ TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {
 
 TEST(ForeignFile, IsCalledSo) {
   const Folder folder;
-  write_bytes(folder / "text", "name = 1\nE = 5000 Pa, and enough text to be longer than a superblock.\n");
+  write_bytes(folder / "text",
+              "name = 1\nE = 5000 Pa, and enough text to be longer than what files begin with.\n");
   EXPECT_NE(refusal([&] { load_model(folder / "text"); }).find("is not a Palpate file"), std::string::npos);
   write_bytes(folder / "empty", "");
   EXPECT_NE(refusal([&] { load_model(folder / "empty"); }).find("empty"), std::string::npos);
@@ -658,6 +657,7 @@ TEST(ForeignFile, OfHdf5IsCalledSo) {
     H5Pclose(access);
     const std::string text = refusal([&] { load_model(folder / "foreign.h5"); });
     EXPECT_NE(text.find("is an HDF5 file, but not a Palpate file"), std::string::npos) << text;
+    EXPECT_NE(text.find("palpate-precompute index"), std::string::npos) << text;
   }
 }
 
@@ -683,7 +683,7 @@ TEST_P(FlippedBits, AreRefusedOrInSlackSpace) {
   int refused = 0;
   for (int i = 0; i < 50; ++i) {
     std::string flipped = whole;
-    // Half of them in the first page, where HDF5's own structures are dense.
+    // Half of them in the first page, which is the index's.
     const std::size_t byte = random() % (i % 2 == 0 ? whole.size() : 4096);
     flipped[byte] = static_cast<char>(flipped[byte] ^ (1 << (random() % 8)));
     write_bytes(folder / "x.hdf", flipped);

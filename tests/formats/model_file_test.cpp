@@ -12,8 +12,10 @@
 
 #include "base/error.h"
 #include "formats/checksum.h"
-#include "formats/hdf5_contents.h"
+#include "formats/contents.h"
 #include "formats/journal.h"
+#include "formats/writer/hdf5_file.h"
+#include "formats/writer/model_writer.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
@@ -127,7 +129,7 @@ TEST(ModelFile, WithoutGreensFunctionsHoldsTheRest) {
   const Model read = load_model(folder / "a.palpate.hdf");
   EXPECT_EQ(read.scope, Scope::none);
   EXPECT_EQ(difference(written, read), "");
-  EXPECT_FALSE(hdf5::Contents::read(folder / "a.palpate.hdf").has("/greens/packed"));
+  EXPECT_FALSE(Contents::read(folder / "a.palpate.hdf").has("/greens/packed"));
   EXPECT_EQ(files_in(folder), Names{"a.palpate.hdf"});
 }
 
@@ -148,8 +150,8 @@ TEST(ModelFile, TheOutlineIsTheBodyWithoutTheRest) {
 TEST(ModelFile, GreensFunctionsStartOnAPage) {
   const Folder folder;
   const Model model = write_sample(folder / "a.palpate.hdf");
-  const auto file = hdf5::Contents::read(folder / "a.palpate.hdf");
-  const hdf5::Stored greens = file.locate("/greens/packed", hdf5::element_type<double>(), 1);
+  const auto file = Contents::read(folder / "a.palpate.hdf");
+  const Stored greens = file.locate("/greens/packed", number_type<double>(), 1);
   EXPECT_EQ(greens.offset % 4096, 0);
   EXPECT_EQ(greens.dims, std::vector<std::int64_t>{packed_size(model.stored_dofs())});
 }

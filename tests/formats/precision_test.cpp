@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/hdf5_contents.h"
+#include "formats/contents.h"
 #include "formats/model_file.h"
+#include "formats/writer/model_writer.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
@@ -76,11 +77,11 @@ TEST(SplitFile, IsNotContinuedWithAnotherSmoothPart) {
   EXPECT_FALSE(ModelWriter(folder / "a.palpate.hdf", model, Precision::split_precision).has_columns(0, 10));
 }
 
-/// Readers before 3.3 know float32 and float64 only and refuse the file: they would take R for Xi.
-TEST(SplitFile, IsNothingThatOlderReadersKnow) {
+/// Who knows float32 and float64 only would take R for Xi.
+TEST(SplitFile, SaysSo) {
   const Folder folder;
   write_split_sample(folder / "a.palpate.hdf");
-  EXPECT_EQ(hdf5::Contents::read(folder / "a.palpate.hdf").text_attribute("/", "scalar"), "float32+smooth");
+  EXPECT_EQ(Contents::read(folder / "a.palpate.hdf").text_attribute("/", "scalar"), "float32+smooth");
 }
 
 TEST(ForceErrors, AreNotInOlderFiles) {

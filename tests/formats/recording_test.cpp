@@ -16,10 +16,10 @@
 #include <random>
 
 #include "base/error.h"
-#include "formats/hdf5.h"
 #include "formats/mcap/reader.h"
 #include "formats/mcap/writer.h"
 #include "formats/recording_messages.h"
+#include "formats/writer/hdf5_file.h"
 #include "tests/support/formats_sample.h"
 
 namespace palpate::test::recording_test {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/error.h"
-#include "formats/hdf5.h"
 #include "formats/model_file.h"
+#include "formats/writer/hdf5.h"
 #include "matrices/hierarchical_product.h"
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/support/formats_sample.h"

@@ -109,6 +109,32 @@ class NoFiles(FilesTest):
                     self.expect_refused([name], *command)
 
 
+class Index(FilesTest):
+    def test_that_is_not_there_is_named_and_added(self):
+        file = self.bake(cube_toml(2))
+        whole = file.read_bytes()
+        file.write_bytes(whole[32768:])  # as h5repack leaves it
+        for command in ((RUNTIME, "probe", file, "--node", "20", "--displace", "0,0,0"), (PRECOMPUTE, "verify", file)):
+            self.expect_refused(["not a Palpate file with an index", f"palpate-precompute index {file}"], *command)
+        self.assertEqual(run(PRECOMPUTE, "index", file).returncode, 0)
+        self.assertEqual(file.read_bytes(), whole)
+
+    def test_is_renewed_where_another_program_changed_the_file(self):
+        file = self.bake(cube_toml(2))
+        with h5py.File(file, "r+", libver=("v110", "v110")) as model:
+            model.attrs["remark"] = numpy.bytes_("mine")
+        result = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn(f"palpate-precompute index {file}", result.stdout)
+        self.assertEqual(run(PRECOMPUTE, "index", file).returncode, 0)
+        self.assertEqual(run(PRECOMPUTE, "verify", file).returncode, 0)
+
+    def test_is_not_added_to_what_is_no_model(self):
+        self.write("notes.hdf", "none")
+        self.expect_refused(["notes.hdf", "is not an HDF5 file"], PRECOMPUTE, "index", "notes.hdf")
+        self.assertEqual((self.folder / "notes.hdf").read_text(), "none")
+
+
 class CleanText(FilesTest):
     ESCAPE = "\x1b]0;owned\x07\x1b[2J\u202e"
     SHOWN = "\\x1b]0;owned\\x07\\x1b[2J\\u202e"
@@ -148,9 +174,10 @@ class CleanText(FilesTest):
         file = self.bake(cube_toml(2))
         with h5py.File(file, "r+", libver=("v110", "v110")) as model:
             minor = model.attrs["version"][1]
-            for name, value in (("name", "cube\x1b[2J".encode()), ("version", [3, minor + 1])):
+            for name, value in (("name", "cube\x1b[2J".encode()), ("version", [4, minor + 1])):
                 del model.attrs[name]
                 model.attrs[name] = numpy.array(value, dtype="S80" if name == "name" else "int64")
+        self.assertEqual(run(PRECOMPUTE, "index", file).returncode, 0)
         for command in ((PRECOMPUTE, "inspect", file), (RUNTIME, "probe", file, "--node", "20", "--displace", "0,0,0")):
             result = run(*command)
             self.assertEqual(result.returncode, 0, result.stderr)

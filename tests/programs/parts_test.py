@@ -207,6 +207,7 @@ class Misfits(PartsTest):
             part = self.folder / f"cube.palpate.hdf.part-{number}-of-2"
             with h5py.File(part, "r+") as file:
                 file.attrs["generator"] = numpy.bytes_("palpate-precompute 7.1.0")
+            self.assertEqual(run(PRECOMPUTE, "index", part).returncode, 0)
             journal = part.with_name(part.name + ".progress")
             lines = journal.read_text().split("\n")
             key = lines[1].split(" ")[1]

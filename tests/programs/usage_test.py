@@ -123,7 +123,7 @@ class Usage(ProgramTest):
                     self.assertLessEqual(len(line), 110)
 
     def test_help_is_a_command_too(self):
-        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare")),
+        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare", "index")),
                                   (RUNTIME, ("play", "view", "probe", "session", "export", "devices"))):
             whole = run(program, "help")
             self.assertEqual((whole.returncode, whole.stderr), (0, ""))
@@ -135,7 +135,7 @@ class Usage(ProgramTest):
                 self.assertEqual(page.stdout, run(program, command, "--help").stdout)
 
     def test_each_page_has_examples_of_its_own(self):
-        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare")),
+        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare", "index")),
                                   (RUNTIME, ("play", "view", "probe", "session", "export", "devices"))):
             for command in commands:
                 with self.subTest(command=command):
@@ -146,7 +146,7 @@ class Usage(ProgramTest):
                     self.assertEqual(set(named), {command})
 
     def test_pages_fit_a_terminal(self):
-        for program, commands in ((PRECOMPUTE, ("", "inspect", "verify", "compare")),
+        for program, commands in ((PRECOMPUTE, ("", "inspect", "verify", "compare", "index")),
                                   (RUNTIME, ("", "play", "view", "probe", "session", "export", "devices"))):
             for command in commands:
                 page = run(program, *[command][: len(command)], "--help").stdout

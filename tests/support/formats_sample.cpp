@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "formats/writer/model_writer.h"
 #include "matrices/hierarchical.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"

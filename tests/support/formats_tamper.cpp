@@ -7,8 +7,10 @@
 #include <functional>
 #include <stdexcept>
 
+#include "base/file_io.h"
 #include "formats/checksum.h"
-#include "formats/hdf5.h"
+#include "formats/writer/hdf5.h"
+#include "formats/writer/hdf5_walk.h"
 
 namespace palpate::test {
 namespace {
@@ -24,6 +26,16 @@ Id open(const std::filesystem::path& path, unsigned mode = H5F_ACC_RDWR) {
   Id file(H5Fopen(path.c_str(), mode, access.get()), H5Fclose);
   if (!file.valid()) throw std::runtime_error("cannot tamper with " + path.string());
   return file;
+}
+
+/// Changes a file, and then its index.
+void edit(const std::filesystem::path& path, const std::function<void(hid_t)>& change) {
+  {
+    const Id file = open(path);
+    change(file.get());
+  }
+  const FileDescriptor changed = open_file(path, OpenMode::write);
+  write_exactly(changed, hdf5::index_of_own(changed), 0);
 }
 
 bool has(hid_t file, const std::string& object) {
@@ -112,91 +124,92 @@ bool set_bytes(const std::filesystem::path& path, const std::string& dataset, st
 
 void replace(const std::filesystem::path& path, const std::string& dataset, hid_t type,
              const std::vector<hsize_t>& dims, const void* bytes, bool chunked) {
-  const Id file = open(path);
-  if (has(file.get(), dataset)) H5Ldelete(file.get(), dataset.c_str(), H5P_DEFAULT);
-  const Id space(dims.empty() ? H5Screate(H5S_SCALAR)
-                              : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr),
-                 H5Sclose);
-  const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  double entries = 1;
-  for (const hsize_t dim : dims) entries *= static_cast<double>(dim);
-  H5Pset_alloc_time(creation.get(), entries > most_entries ? H5D_ALLOC_TIME_LATE : H5D_ALLOC_TIME_EARLY);
-  if (chunked) H5Pset_chunk(creation.get(), static_cast<int>(dims.size()), dims.data());
-  const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
-  H5Pset_create_intermediate_group(links.get(), 1);
-  const Id made(
-      H5Dcreate2(file.get(), dataset.c_str(), type, space.get(), links.get(), creation.get(), H5P_DEFAULT),
-      H5Dclose);
-  if (!made.valid()) throw std::runtime_error("cannot replace " + dataset);
-  if (bytes != nullptr) H5Dwrite(made.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes);
-  put_text(made.get(), "xxh3", "");
+  edit(path, [&](hid_t file) {
+    if (has(file, dataset)) H5Ldelete(file, dataset.c_str(), H5P_DEFAULT);
+    const Id space(dims.empty() ? H5Screate(H5S_SCALAR)
+                                : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr),
+                   H5Sclose);
+    const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    double entries = 1;
+    for (const hsize_t dim : dims) entries *= static_cast<double>(dim);
+    H5Pset_alloc_time(creation.get(), entries > most_entries ? H5D_ALLOC_TIME_LATE : H5D_ALLOC_TIME_EARLY);
+    if (chunked) H5Pset_chunk(creation.get(), static_cast<int>(dims.size()), dims.data());
+    const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+    H5Pset_create_intermediate_group(links.get(), 1);
+    const Id made(
+        H5Dcreate2(file, dataset.c_str(), type, space.get(), links.get(), creation.get(), H5P_DEFAULT),
+        H5Dclose);
+    if (!made.valid()) throw std::runtime_error("cannot replace " + dataset);
+    if (bytes != nullptr) H5Dwrite(made.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes);
+    put_text(made.get(), "xxh3", "");
+  });
 }
 
 void remove_object(const std::filesystem::path& path, const std::string& object) {
-  const Id file = open(path);
-  if (has(file.get(), object)) H5Ldelete(file.get(), object.c_str(), H5P_DEFAULT);
+  edit(path, [&](hid_t file) {
+    if (has(file, object)) H5Ldelete(file, object.c_str(), H5P_DEFAULT);
+  });
 }
 
 void replace_by_soft_link(const std::filesystem::path& path, const std::string& object,
                           const std::string& target) {
   remove_object(path, object);
-  const Id file = open(path);
-  H5Lcreate_soft(target.c_str(), file.get(), object.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+  edit(path,
+       [&](hid_t file) { H5Lcreate_soft(target.c_str(), file, object.c_str(), H5P_DEFAULT, H5P_DEFAULT); });
 }
 
 void set_text(const std::filesystem::path& path, const std::string& attribute, const std::string& text) {
-  const Id file = open(path);
-  put_text(file.get(), attribute, text);
+  edit(path, [&](hid_t file) { put_text(file, attribute, text); });
 }
 
 void set_integers(const std::filesystem::path& path, const std::string& attribute,
                   const std::vector<std::int64_t>& values) {
-  const Id file = open(path);
-  if (H5Aexists(file.get(), attribute.c_str()) > 0) H5Adelete(file.get(), attribute.c_str());
-  const hsize_t count = values.size();
-  const Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-  const Id made(
-      H5Acreate2(file.get(), attribute.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
-      H5Aclose);
-  H5Awrite(made.get(), H5T_NATIVE_INT64, values.data());
+  edit(path, [&](hid_t file) {
+    if (H5Aexists(file, attribute.c_str()) > 0) H5Adelete(file, attribute.c_str());
+    const hsize_t count = values.size();
+    const Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    const Id made(H5Acreate2(file, attribute.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                  H5Aclose);
+    H5Awrite(made.get(), H5T_NATIVE_INT64, values.data());
+  });
 }
 
 void remove_attribute(const std::filesystem::path& path, const std::string& object,
                       const std::string& attribute) {
-  const Id file = open(path);
-  H5Adelete_by_name(file.get(), object.c_str(), attribute.c_str(), H5P_DEFAULT);
+  edit(path, [&](hid_t file) { H5Adelete_by_name(file, object.c_str(), attribute.c_str(), H5P_DEFAULT); });
 }
 
 void reseal(const std::filesystem::path& path) {
-  const Id file = open(path);
-  std::vector<std::string> lines;
-  for (const std::string& name : datasets_of(file.get())) {
-    const Id dataset(H5Dopen2(file.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-    if (H5Aexists(dataset.get(), "xxh3") <= 0) continue;
-    const std::string digits = dataset_checksum(dataset.get());
-    put_text(dataset.get(), "xxh3", digits);
-    lines.push_back(std::string("dataset ").append(name).append(" ").append(digits).append("\n"));
-  }
-  const Id root(H5Gopen2(file.get(), "/", H5P_DEFAULT), H5Gclose);
-  H5O_info_t info = {};
-  H5Oget_info2(root.get(), &info, H5O_INFO_NUM_ATTRS);
-  for (hsize_t i = 0; i < info.num_attrs; ++i) {
-    const Id attribute(
-        H5Aopen_by_idx(root.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-    std::string name(200, '\0');
-    name.resize(static_cast<std::size_t>(H5Aget_name(attribute.get(), name.size(), name.data())));
-    if (name != "content_hash") {
-      lines.push_back(std::string("attribute ")
-                          .append(name)
-                          .append(" ")
-                          .append(attribute_text(attribute.get()))
-                          .append("\n"));
+  edit(path, [](hid_t file) {
+    std::vector<std::string> lines;
+    for (const std::string& name : datasets_of(file)) {
+      const Id dataset(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
+      if (H5Aexists(dataset.get(), "xxh3") <= 0) continue;
+      const std::string digits = dataset_checksum(dataset.get());
+      put_text(dataset.get(), "xxh3", digits);
+      lines.push_back(std::string("dataset ").append(name).append(" ").append(digits).append("\n"));
     }
-  }
-  std::sort(lines.begin(), lines.end());
-  std::string text;
-  for (const std::string& line : lines) text += line;
-  put_text(root.get(), "content_hash", checksum(std::string_view(text)));
+    const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose);
+    H5O_info_t info = {};
+    H5Oget_info2(root.get(), &info, H5O_INFO_NUM_ATTRS);
+    for (hsize_t i = 0; i < info.num_attrs; ++i) {
+      const Id attribute(
+          H5Aopen_by_idx(root.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+      std::string name(200, '\0');
+      name.resize(static_cast<std::size_t>(H5Aget_name(attribute.get(), name.size(), name.data())));
+      if (name != "content_hash") {
+        lines.push_back(std::string("attribute ")
+                            .append(name)
+                            .append(" ")
+                            .append(attribute_text(attribute.get()))
+                            .append("\n"));
+      }
+    }
+    std::sort(lines.begin(), lines.end());
+    std::string text;
+    for (const std::string& line : lines) text += line;
+    put_text(root.get(), "content_hash", checksum(std::string_view(text)));
+  });
 }
 
 }  // namespace palpate::test

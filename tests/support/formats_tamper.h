@@ -1,6 +1,6 @@
 // Changes a baked file behind the writer's back and makes its checksums right again, by the rules of
 // docs/file-format.md and not by the code under test: so that a reader's checks are met, and not only its
-// checksums.
+// checksums. The index follows each change of the HDF5.
 #pragma once
 
 #include <hdf5.h>

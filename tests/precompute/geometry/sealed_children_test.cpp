@@ -11,7 +11,9 @@
 #include <string>
 
 #include "base/limits/child_seal.h"
-#include "formats/hdf5_contents.h"
+#include "formats/contents.h"
+#include "formats/writer/hdf5_file.h"
+#include "formats/writer/hdf5_walk.h"
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/picture_reader.h"
@@ -143,10 +145,11 @@ TEST_F(SealedChildren, OfHdf5) {
   const std::vector<double> values = {1.0, 2.0, 3.0};
   const std::array<std::int64_t, 1> dims = {3};
   hdf5::File file = hdf5::File::create(path);
-  file.write("/x", hdf5::element_type<double>(), dims, values.data());
+  file.write("/x", number_type<double>(), dims, values.data());
   file.close();
-  const hdf5::Contents contents = hdf5::Contents::read(path);
-  EXPECT_EQ(contents.locate("/x", hdf5::element_type<double>(), 1).bytes, 24);
+  const Contents contents =
+      Contents::of(open_file(path, OpenMode::read), hdf5::index_of(open_file(path, OpenMode::read)));
+  EXPECT_EQ(contents.locate("/x", number_type<double>(), 1).bytes, 24);
   EXPECT_EQ(children(), 1);
 }
 

@@ -23,6 +23,7 @@
 #include "base/regular_file.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
+#include "formats/writer/model_writer.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"
 #include "runtime/app/play_session.h"

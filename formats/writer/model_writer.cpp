@@ -1,3 +1,5 @@
+#include "formats/writer/model_writer.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,15 +12,16 @@
 #include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
+#include "formats/contents.h"
 #include "formats/dynamics_fields.h"
-#include "formats/hdf5.h"
-#include "formats/hdf5_contents.h"
 #include "formats/hierarchical_fields.h"
 #include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
+#include "formats/writer/hdf5_file.h"
+#include "formats/writer/hdf5_walk.h"
 
 namespace palpate {
 namespace {
@@ -45,7 +48,7 @@ std::string checksum_of(const std::vector<T>& values) {
 template <class T>
 void write_field(hdf5::File& file, const Field<T>& field, const Model& model, const Counts& counts) {
   const std::vector<T> values = field.take(model);
-  file.write(field.path, hdf5::element_type<T>(), counts.sizes(field.shape), values.data());
+  file.write(field.path, number_type<T>(), counts.sizes(field.shape), values.data());
   file.write_attribute(field.path, "xxh3", checksum_of(values));
 }
 
@@ -138,7 +141,7 @@ struct ModelWriter::Impl {
   struct Streamed {
     const char* path;
     const char* name;
-    hdf5::ElementType scalar;
+    NumberType scalar;
     std::vector<std::int64_t> starts;  ///< [pieces + 1] first entry of each
     std::shared_ptr<const SmoothPart> smooth;
     std::vector<bool> done{};  ///< [pieces]
@@ -212,7 +215,7 @@ ModelWriter::Impl::Streamed ModelWriter::Impl::packed_by_columns(const char* pat
                                                                  Precision precision, std::int64_t order) {
   Streamed streamed{path,
                     name,
-                    has_float_entries(precision) ? hdf5::element_type<float>() : hdf5::element_type<double>(),
+                    has_float_entries(precision) ? number_type<float>() : number_type<double>(),
                     {},
                     matrix.smooth()};
   for (std::int64_t j = 0; j <= order; ++j) streamed.starts.push_back(packed_column(j, order));
@@ -225,7 +228,7 @@ std::vector<ModelWriter::Impl::Streamed> ModelWriter::Impl::streamed(const Model
   if (model.scope == Scope::none) return matrices;
   const std::int64_t order = model.stored_dofs();
   if (const HierarchicalMatrix* compressed = model.compressed.get(); compressed != nullptr) {
-    Streamed near{near_path, "the near pairs", hdf5::element_type<float>(), {}, nullptr};
+    Streamed near{near_path, "the near pairs", number_type<float>(), {}, nullptr};
     for (Index leaf = 0; leaf <= compressed->tree.leaves(); ++leaf)
       near.starts.push_back(compressed->near_at[static_cast<std::size_t>(compressed->first_near_pair(leaf))]);
     matrices.push_back(std::move(near));
@@ -357,10 +360,12 @@ void ModelWriter::Impl::join_in(const std::string& journal_text,
 /// journal says.
 bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
   try {
-    const hdf5::Contents contents = hdf5::Contents::read(partial);
+    FileDescriptor file = open_file(partial, OpenMode::read);
+    const std::vector<std::byte> index = hdf5::index_of(file);
+    const Contents contents = Contents::of(std::move(file), index);
     for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
       if (matrices[matrix].bytes() == 0) continue;
-      const hdf5::Stored stored = contents.locate(matrices[matrix].path, matrices[matrix].scalar, 1);
+      const Stored stored = contents.locate(matrices[matrix].path, matrices[matrix].scalar, 1);
       if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != matrices[matrix].bytes())
         return false;
     }
@@ -493,7 +498,7 @@ void ModelWriter::Impl::add_part(const std::filesystem::path& from) {
   if (!left || !left->frame.part || left->frame.part->pieces.size() != matrices.size())
     throw Error("holds no part of this model", from.string(), again);
   if (left->frame.key != frame.key) {
-    const std::string other = hdf5::Contents::read(from).text_attribute("/", "generator").value_or("");
+    const std::string other = Contents::read(from).text_attribute("/", "generator").value_or("");
     const std::string ours = "palpate-precompute " PALPATE_VERSION;
     if (other != ours) throw Error("was made by " + other + ", and this is " + ours, from.string(), again);
     throw Error(
@@ -559,7 +564,7 @@ void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
     const float* numbers = (matrix.*array.data).get();
     if (!std::all_of(numbers, numbers + entries, [](float value) { return std::isfinite(value); }))
       refuse(path.string(), std::string(array.path) + " holds a value that is not finite");
-    file.write(array.path, hdf5::element_type<float>(), std::array{entries}, numbers);
+    file.write(array.path, number_type<float>(), std::array{entries}, numbers);
     ChunkedChecksum running;
     running.append(std::as_bytes(std::span(numbers, static_cast<std::size_t>(entries))));
     file.write_attribute(array.path, "xxh3", running.digits());

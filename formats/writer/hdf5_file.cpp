@@ -1,27 +1,31 @@
-#include "formats/hdf5.h"
+#include "formats/writer/hdf5_file.h"
 
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <limits>
-#include <string_view>
+#include <cstddef>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
+#include "base/file_io.h"
+#include "formats/writer/hdf5_walk.h"
 
 namespace palpate::hdf5 {
 namespace {
 
-constexpr hsize_t alignment = 4096;  // a page
 constexpr std::size_t longest_written_text = 4096;
 constexpr std::size_t highest_rank = 4;
 constexpr const char* disk_hint = "Check the disk and the folder's permissions";
 
-/// We close every file ourselves; the library's own exit handler crashes after a close that failed (full
-/// disk).
-[[maybe_unused]] const herr_t no_exit_handler = H5dont_atexit();
+/// Creation properties without times, for kinds such as H5P_DATASET_CREATE.
+Id timeless(hid_t kind) {
+  Id properties(H5Pcreate(kind), H5Pclose);
+  H5Pset_obj_track_times(properties.get(), false);
+  return properties;
+}
 
 Id text_type(std::size_t length, H5T_cset_t characters) {
   Id type(H5Tcopy(H5T_C_S1), H5Tclose);
@@ -55,84 +59,6 @@ Rows select_rows(const Id& dataset, std::int64_t first, std::int64_t rows) {
 
 }  // namespace
 
-Id::Id(Id&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), closer_(other.closer_) {}
-
-Id& Id::operator=(Id&& other) noexcept {
-  close();
-  id_ = std::exchange(other.id_, H5I_INVALID_HID);
-  closer_ = other.closer_;
-  return *this;
-}
-
-Id::~Id() {
-  close();
-}
-
-bool Id::close() noexcept {
-  return id_ < 0 || closer_(std::exchange(id_, H5I_INVALID_HID)) >= 0;
-}
-
-template <>
-ElementType element_type<std::uint8_t>() {
-  return {"uint8", 1, H5T_STD_U8LE};
-}
-template <>
-ElementType element_type<std::uint32_t>() {
-  return {"uint32", 4, H5T_STD_U32LE};
-}
-template <>
-ElementType element_type<std::int32_t>() {
-  return {"int32", 4, H5T_STD_I32LE};
-}
-template <>
-ElementType element_type<std::int64_t>() {
-  return {"int64", 8, H5T_STD_I64LE};
-}
-template <>
-ElementType element_type<float>() {
-  return {"float32", 4, H5T_IEEE_F32LE};
-}
-template <>
-ElementType element_type<double>() {
-  return {"float64", 8, H5T_IEEE_F64LE};
-}
-
-std::string reason() {
-  std::string text;
-  const auto first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
-    if (error->desc != nullptr) *static_cast<std::string*>(data) = error->desc;
-    return 1;
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &text);
-  constexpr std::string_view before = "error message = '";
-  if (const std::size_t at = text.find(before); at != std::string::npos)
-    text = text.substr(at + before.size(), text.find('\'', at + before.size()) - at - before.size());
-  return text.empty() ? "no reason given" : text;
-}
-
-Id access_properties(std::int64_t align_from) {
-  Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_fapl_sec2(access.get());
-  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
-  // 1.10's format has a checksum in every piece of metadata; the older ones have none.
-  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
-  // Finished files never change and half-written ones are locked by their journal; HDF5's own lock fails on
-  // some network disks.
-  H5Pset_file_locking(access.get(), false, true);
-  if (align_from > 0) {
-    H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
-  } else {
-    H5Pset_small_data_block_size(access.get(), 0);  // small rows follow each other, too
-  }
-  return access;
-}
-
-Id timeless(hid_t kind) {
-  Id properties(H5Pcreate(kind), H5Pclose);
-  H5Pset_obj_track_times(properties.get(), false);
-  return properties;
-}
-
 void File::fail(const std::string& doing) const {
   throw Error("cannot " + doing + ": " + reason(), path_.string(), disk_hint);
 }
@@ -140,6 +66,7 @@ void File::fail(const std::string& doing) const {
 File File::create(const std::filesystem::path& path, std::int64_t align_from) {
   const Id access = access_properties(align_from);
   const Id creation = timeless(H5P_FILE_CREATE);
+  H5Pset_userblock(creation.get(), static_cast<hsize_t>(index_bytes));
   File file(Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose), path);
   if (!file.file_.valid()) {
     // Where the file vanishes while HDF5 makes it, HDF5 keeps the system's reason to itself.
@@ -181,7 +108,7 @@ void File::make_link(const std::string& link, const std::string& target) {
     fail("make the link " + link);
 }
 
-std::int64_t File::write(const std::string& dataset, const ElementType& type,
+std::int64_t File::write(const std::string& dataset, const NumberType& type,
                          std::span<const std::int64_t> dims, const void* data) {
   make_group(dataset.substr(0, dataset.rfind('/')));
   const std::vector<hsize_t> sizes(dims.begin(), dims.end());
@@ -190,11 +117,11 @@ std::int64_t File::write(const std::string& dataset, const ElementType& type,
   H5Pset_layout(creation.get(), H5D_CONTIGUOUS);
   H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
   H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
-  const Id made(
-      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-      H5Dclose);
+  const Id made(H5Dcreate2(id(), dataset.c_str(), type_of(type.name), space.get(), H5P_DEFAULT,
+                           creation.get(), H5P_DEFAULT),
+                H5Dclose);
   if (!made.valid()) fail("make " + dataset);
-  if (data != nullptr && H5Dwrite(made.get(), type.id, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
+  if (data != nullptr && H5Dwrite(made.get(), type_of(type.name), H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
     fail("write " + dataset);
   return static_cast<std::int64_t>(H5Dget_offset(made.get()));
 }
@@ -231,25 +158,19 @@ Id File::open_dataset(const std::string& dataset) const {
   return opened;
 }
 
-void File::write_rows(const std::string& dataset, const ElementType& type, std::int64_t first,
+void File::write_rows(const std::string& dataset, const NumberType& type, std::int64_t first,
                       std::int64_t rows, const void* data) {
   const Id opened = open_dataset(dataset);
   const Rows selected = select_rows(opened, first, rows);
-  if (H5Dwrite(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
+  if (H5Dwrite(opened.get(), type_of(type.name), selected.memory.get(), selected.file.get(), H5P_DEFAULT,
+               data) < 0)
     fail("write " + dataset);
 }
 
 void File::close() {
   if (!file_.close()) fail("write the file");
-}
-
-Quiet::Quiet() {
-  H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-}
-
-Quiet::~Quiet() {
-  H5Eset_auto2(H5E_DEFAULT, print_, data_);
+  const FileDescriptor written = open_file(path_, OpenMode::write);
+  write_exactly(written, index_of_own(written), 0);
 }
 
 }  // namespace palpate::hdf5
