@@ -216,7 +216,7 @@ Check check_warp_study(const Model& model) {
 std::vector<std::string> differences_of(const Model& model, const std::filesystem::path& file) {
   std::vector<std::string> differences = description_differences(model, file);
   if (!is_index_right(file))
-    differences.push_back("the file's index does not say what its HDF5 says; palpate-precompute index " +
+    differences.push_back("the file's index differs from what its HDF5 says; palpate-precompute index " +
                           shell_word(file.string()) + " writes it anew");
   return differences;
 }

@@ -38,7 +38,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [3, 6], "version of a model")
+        expect(list(attributes["version"]) == [4, 0], "version of a model")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
