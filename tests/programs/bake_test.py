@@ -540,18 +540,19 @@ class Models(ProgramTest):
         self.assertEqual(planned.returncode, 0, planned.stderr)
         self.assertIn("12288 elements (hex8)", planned.stderr)
 
-    def test_the_demo_s_liver_takes_overlays(self):
-        model = MODELS / "liver" / "model.toml"
+    def test_the_liver_for_overlays_takes_them(self):
+        model = MODELS / "liver_overlay" / "model.toml"
         storage = tomllib.loads(model.read_text())["storage"]
         self.assertEqual((storage["scope"], storage["layers"]), ("layers", 2))  # as many as the overlay has rings
-        image = model.with_name("liver.inr.gz")
+        image = MODELS / "liver" / "liver.inr.gz"
         if not image.exists():
             self.skipTest("scripts/demo fetches the liver's image")
         shutil.copy(image, self.folder)
-        coarse = self.write("model.toml", re.sub("edge_length = [0-9.]+", "edge_length = 0.012", model.read_text()))
+        text = model.read_text().replace("../liver/liver.inr.gz", "liver.inr.gz")
+        coarse = self.write("model.toml", re.sub("edge_length = [0-9.]+", "edge_length = 0.012", text))
         self.assertEqual(run(PRECOMPUTE, coarse, cwd=self.folder).returncode, 0)
         touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.155,0.0,0.117,0\n0.2,0.155,0.03,0.117,0\n")
-        played = run(RUNTIME, "play", self.folder / "liver.palpate.hdf", "--device", f"script:{touch}", "--fast", "--tool",
+        played = run(RUNTIME, "play", self.folder / "liver_overlay.palpate.hdf", "--device", f"script:{touch}", "--fast", "--tool",
                      "sphere:0.008", "--overlay", "r=3,rings=2", "--report", self.folder / "report.json")
         self.assertEqual(played.returncode, 0, played.stderr)
         self.assertGreater(json.loads((self.folder / "report.json").read_text())["largest_force_N"], 0.0)
