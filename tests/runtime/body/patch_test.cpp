@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "meshes/element.h"
+#include "runtime/body/free_motion.h"
 #include "runtime/body/near_field.h"
 #include "runtime/body/overlay.h"
 #include "tests/support/runtime_model.h"
