@@ -92,7 +92,9 @@ PointTangent positive_corotational_tangent(const LawConstants& c, const Mat3& F,
                                            const Mat3& relaxed) noexcept {
   const Mat3 R = rotation_of(LiveLaw::corotational, c, F), S = sym(R.transpose() * F);
   const double stress = 2.0 * c.mu - c.lambda * (S - Mat3::Identity() - relaxed).trace();
-  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+  // By rows, as no other source has it: of two solvers of one type, this one with fused multiply-add, the
+  // linker would keep one for both.
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> eigen;
   eigen.computeDirect(S.trace() * Mat3::Identity() - S);
   const Vec3 share = eigen.eigenvalues().unaryExpr([&](double g) {
     if (stress <= 0.0) return g > 1e-6 ? std::max(stress / g, -1e3 * c.mu) : 0.0;
