@@ -1,6 +1,7 @@
 #include "precompute/geometry/distance_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -143,27 +144,46 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
 }
 
 void DistanceField::grow_to(double voxels) {
-  constexpr int points = 8;
-  const double reach = grid_.spacing.norm();  // the field changes by at most 2 a unit of length
+  // Eighths of voxels, in each of which the field is taken for linear.
+  struct Eighth {
+    double middle, width;  // of its values
+  };
+  const double most = 2.0 * grid_.spacing.maxCoeff();  // that the boundary is moved by, as the field has it
+  const double reach = 2.0 * grid_.spacing.norm();     // that a field can change by within a voxel
   double inside = 0.0;
-  std::vector<float> near;  // values at points by the boundary
+  std::vector<Eighth> near;
   for (std::size_t v = 0; v < distance_.size(); ++v) {
-    if (static_cast<double>(distance_[v]) > reach) {
-      inside += points;
-    } else if (static_cast<double>(distance_[v]) > -3.0 * reach) {
-      for (unsigned p = 0; p < points; ++p) {
-        const Vec3 side((p & 1U) != 0 ? 0.25 : -0.25, (p & 2U) != 0 ? 0.25 : -0.25,
-                        (p & 4U) != 0 ? 0.25 : -0.25);
-        near.push_back(static_cast<float>((*this)(grid_.center(v) + side.cwiseProduct(grid_.spacing))));
+    const auto middle = static_cast<double>(distance_[v]);
+    if (middle > reach) {
+      inside += 8.0;
+    } else if (middle > -most - reach) {
+      std::array<double, 8> values{};
+      std::array<double, 3> slopes{};
+      for (unsigned k = 0; k < 8; ++k) {
+        const Vec3 side((k & 1U) != 0 ? 0.25 : -0.25, (k & 2U) != 0 ? 0.25 : -0.25,
+                        (k & 4U) != 0 ? 0.25 : -0.25);
+        values[k] = (*this)(grid_.center(v) + side.cwiseProduct(grid_.spacing));
+        for (unsigned axis = 0; axis < 3; ++axis)
+          slopes[axis] += (k >> axis & 1U) != 0 ? values[k] : -values[k];
       }
+      const double width =
+          (std::abs(slopes[0]) + std::abs(slopes[1]) + std::abs(slopes[2])) / 4.0 + 1e-9 * most;
+      for (const double value : values) near.push_back({value, width});
     }
   }
-  const double wanted = std::clamp(points * voxels - inside, 0.0, static_cast<double>(near.size()));
-  const auto last = near.begin() + static_cast<std::ptrdiff_t>(wanted);
-  if (last == near.end()) return;
-  std::nth_element(near.begin(), last, near.end(), std::greater<>());
-  if (*last >= 0.0F) return;
-  for (float& distance : distance_) distance -= *last;
+  const auto volume = [&](double level) {
+    double sum = inside;
+    for (const Eighth& eighth : near)
+      sum += std::clamp(0.5 + (eighth.middle - level) / eighth.width, 0.0, 1.0);
+    return sum / 8.0;
+  };
+  double low = -most, high = 0.0;
+  if (volume(high) >= voxels) return;
+  for (int halving = 0; halving < 40; ++halving) {
+    const double level = (low + high) / 2.0;
+    (volume(level) < voxels ? high : low) = level;
+  }
+  for (float& distance : distance_) distance -= static_cast<float>(high);
 }
 
 LabelField::LabelField(const VoxelBody& body) : body_(body, body.inside) {

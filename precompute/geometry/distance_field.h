@@ -22,8 +22,8 @@ class DistanceField {
   /// At a point in the image's length unit; beyond the grid, the value at its rim.
   [[nodiscard]] double operator()(const Vec3& x) const noexcept;
 
-  /// Moves the boundary outward until the volume inside is that of so many voxels, sampled at eight points of
-  /// each; nothing where it is already.
+  /// Moves the boundary outward, by a voxel at most, until the volume inside is that of so many voxels.
+  /// Nothing where that is so already.
   void grow_to(double voxels);
 
  private:

@@ -235,7 +235,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
   const std::string where = image.file.string();
   const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
   LabelField field(body);
-  // Smoothing takes from whatever curves outward: of a ball nine voxels thick 8 %.
+  // Smoothing takes from whatever curves outward: of a ball nine voxels thick 10 %.
   field.grow_to((1.0 - most_smoothed) * check_thickness(body, field, where, notes));
   const bool by_tetgen = options.mesher == Mesher::tetgen;
   Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);

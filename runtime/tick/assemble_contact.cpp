@@ -158,8 +158,8 @@ void bring_into_order(State& state, AssemblyScratch& assembly) noexcept {
 
 /// Where contacts are many, those with friction and those that are held have a row for each axis: their
 /// compliance is that of their nodes as it stands, however the normals turn.
-void add_one_of_many(const Body& body, const SurfaceState& surface, Scratch& scratch, const ContactPoint& contact,
-                     const UpcomingContact& upcoming) noexcept {
+void add_one_of_many(const Body& body, const SurfaceState& surface, Scratch& scratch,
+                     const ContactPoint& contact, const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
   const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last.contacts[upcoming.last];
   if (upcoming.stays_open) return problem.add_open();
