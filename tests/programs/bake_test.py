@@ -294,8 +294,8 @@ lowest = { axis = "x", percent = 0.1 }
         output = self.folder / "x.palpate.hdf"
         journal = self.folder / "x.palpate.hdf.progress"
         for end in (signal.SIGINT, signal.SIGTERM):
-            with subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL) as first:
-                self.wait_for(journal.exists, first)
+            with subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.PIPE) as first:
+                self.assertIn(b"mesh", first.stderr.readline())  # so the output is claimed
                 first.send_signal(signal.SIGSTOP)
                 self.assertEqual(journal.read_bytes(), b"", "before the columns")
                 if end == signal.SIGINT:
