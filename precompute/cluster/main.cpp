@@ -19,7 +19,7 @@ namespace palpate {
 namespace {
 
 constexpr const char* program = "palpate-precompute-mpi";
-constexpr std::chrono::seconds leader_first{2};  // all ranks have most errors, and the leader tells of them
+constexpr std::chrono::seconds leader_first{10};  // all ranks have most errors, and the leader tells of them
 
 /// An error of another rank than the leader, with its place.
 Error of_rank(const Error& error, const RankTeam& team) {
