@@ -165,7 +165,7 @@ Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const Mesh
 }
 
 constexpr double most_lost = 0.1;         // of the voxels
-constexpr double most_smoothed = 0.01;    // of the volume
+constexpr double most_smoothed = 0.03;    // of the volume
 constexpr std::size_t told_part = 8;      // [voxels] of one that is lost
 constexpr double told_difference = 0.05;  // of the volume
 const char* const finer_voxels =

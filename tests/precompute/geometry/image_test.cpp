@@ -305,7 +305,7 @@ TEST_F(ImageMesh, SmallBodiesKeepTheirVolume) {
         if (Vec3(i - 9, j - 9, k - 9).norm() < 4.6) voxels += image(i, j, k) = 1;
   MeshOptions options = edges(0.7);
   options.facet_distance = 0.05;
-  EXPECT_NEAR(volume(mesh(image, options)), voxels, 0.03 * voxels);  // smoothing alone takes 15 %
+  EXPECT_NEAR(volume(mesh(image, options)), voxels, 0.05 * voxels);  // smoothing alone takes 15 %
 }
 
 TEST(DistanceField, FlatSidesMoveByAsMuchAsIsMissing) {
