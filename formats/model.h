@@ -53,7 +53,7 @@ struct ForceErrors {
   [[nodiscard]] double& operator[](Precision precision) noexcept {
     return of_precision[static_cast<std::size_t>(precision)];
   }
-  /// Whether anything was measured: not in files before format 3.3.
+  /// Whether anything was measured.
   [[nodiscard]] bool any() const noexcept {
     return of_precision[0] >= 0.0 || of_precision[1] >= 0.0 || of_precision[2] >= 0.0;
   }

@@ -44,7 +44,7 @@ struct MergedGroup {
   double defect = 0.0;  ///< how much its members' gaps differ from their mean at most [m]
 };
 
-/// For merging.
+/// Workspace of the merging of contact points.
 struct MergingScratch {
   MergingScratch(Index surface_nodes, Index groups, Index most_members, Index max_contacts);
 
@@ -77,7 +77,7 @@ class LastContacts {
   std::vector<Index> of_feature_;  // [power of 2] their numbers, hashed by feature
 };
 
-/// For detection.
+/// Workspace of contact detection; S surface nodes, F simplices.
 struct DetectionScratch {
   DetectionScratch(const Body& body, Index tools, Index max_contacts);
 
@@ -96,7 +96,7 @@ struct DetectionScratch {
   Index left_out_count = 0;
 };
 
-/// For assembly.
+/// Workspace of the assembly of W and b.
 struct AssemblyScratch {
   AssemblyScratch(const Body& body, Index max_contacts, Index near_nodes);
 
@@ -126,7 +126,7 @@ struct SolverScratch {
   bool was_improved = false;   ///< few contacts took a second solver
 };
 
-/// For the estimate of what a best effort may be off by.
+/// Workspace of the error estimate of a best effort.
 struct ForceErrorScratch {
   ForceErrorScratch(const Body& body, Index tools, Index max_contacts);
 
@@ -136,7 +136,7 @@ struct ForceErrorScratch {
   std::vector<double> left_out_blocks;  ///< [d x d sampled] Xi of these [m/N]
 };
 
-/// For the answer of the forces to motions.
+/// Workspace of linearisation: how forces answer to motions.
 struct ChangeScratch {
   ChangeScratch(const Body& body, Index max_contacts);
 
