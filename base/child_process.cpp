@@ -27,15 +27,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Where the limits on foreign readers are stated: estimates meant to be far above what a whole file takes (a
-/// surface, with its checks, is the slowest), not measurements.
+/// Limits on reading untrusted files: estimates meant to be far above what a valid file takes (a surface,
+/// with its checks, is the slowest), not measurements.
 constexpr std::chrono::seconds reading_time{5};
 constexpr std::chrono::seconds reading_time_per_megabyte{20};
 constexpr std::int64_t reading_memory = 512LL << 20;
 constexpr std::int64_t reading_memory_per_byte = 100;
 constexpr int clock_per_processor = 12;
 
-/// What stands before the bytes that a child sends.
+/// Header of a child's answer.
 struct AnswerHeader {
   enum class Kind : std::int32_t { result, error, exception, no_memory };
   Kind kind = Kind::result;
@@ -43,7 +43,7 @@ struct AnswerHeader {
   std::uint64_t size = 0;
 };
 
-/// A pipe whose ends are closed when it goes.
+/// A pipe whose ends are closed by the destructor.
 struct Pipe {
   std::array<int, 2> ends = {-1, -1};
 
@@ -90,8 +90,7 @@ void set_limits(const ChildLimits& limits) {
   }
 }
 
-/// The child's life: signals as a fresh program has them, neither input nor output, limits, the seal, death
-/// with its parent.
+/// Runs the child: default signal handling, no input or output, limits, the seal, death with its parent.
 [[noreturn]] void be_child(int pipe, pid_t parent, const ChildTask& task,
                            const std::function<ChildResult()>& work) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGPIPE,
@@ -103,13 +102,13 @@ void set_limits(const ChildLimits& limits) {
   sigprocmask(SIG_SETMASK, &none, nullptr);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) {
-    _exit(EXIT_FAILURE);  // it went before prctl
+    _exit(EXIT_FAILURE);  // the parent ended before prctl
   }
   const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (nowhere < 0 || dup2(nowhere, stream) < 0) close(stream);
   }
-  [[maybe_unused]] const int moved = chdir("/proc/self");  // where no file can be made, even without a seal
+  [[maybe_unused]] const int moved = chdir("/proc/self");  // no file can be made there, even without a seal
   set_limits(task.limits);
   std::vector<int> kept = task.files;
   kept.push_back(pipe);
@@ -164,7 +163,7 @@ WaitEnd read_until_closed(int pipe, Clock::time_point deadline, bool stop_at_sig
   }
 }
 
-/// How the child ended; nothing where the host program has taken that from us.
+/// Exit status of the child, as of waitpid; nullopt if the host program has already collected it.
 std::optional<int> wait_for_end(pid_t child) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
@@ -191,7 +190,7 @@ const char* const interrupted_hint = "start it again; nothing was written";
       task.where, task.hint);
 }
 
-/// The child ended without an answer.
+/// Throws Error: the child ended without an answer.
 [[noreturn]] void report_end(const ChildTask& task, std::optional<int> status) {
   if (!status) {
     throw Error(task.name + " crashed", task.where, task.hint);
@@ -211,7 +210,7 @@ const char* const interrupted_hint = "start it again; nothing was written";
               task.where, task.hint + (signal == SIGKILL ? "; SIGKILL is often the lack of memory" : ""));
 }
 
-/// The answer, where the child has sent a whole one.
+/// Header of the answer, if the child has sent a whole one.
 std::optional<AnswerHeader> whole_answer(const Bytes& bytes) {
   AnswerHeader header;
   if (bytes.size() < sizeof(header)) return std::nullopt;

@@ -1,4 +1,4 @@
-// Work that may crash, in a process of its own.
+// Running code that may crash in a child process.
 #pragma once
 
 #include <algorithm>
@@ -13,40 +13,38 @@
 
 namespace palpate {
 
-/// Bytes that a child hands to its parent.
+/// Bytes that a child sends to its parent.
 using Bytes = std::vector<std::byte>;
 
-/// What a child's work gives back: a status that means what the work wants it to (0 is success) and its
-/// result.
+/// Result of a child's work: a status whose meaning the work defines (0 is success), and its bytes.
 struct ChildResult {
   int status = 0;
   Bytes bytes;
 };
 
-/// What a child may use. The clock's limit is generous, as a busy machine gives a child a small share of the
-/// processor; the processor's limit is what ends a child that calculates for ever.
+/// Limits of a child. The wall clock limit is generous because a busy machine gives a child little of the
+/// processor; the processor limit is the one that ends a child that never stops computing.
 struct ChildLimits {
-  std::chrono::seconds processor{};  ///< of the processor, from 1
-  std::chrono::seconds clock{};      ///< from the start to the end
+  std::chrono::seconds processor{};  ///< processor time, at least 1 s
+  std::chrono::seconds clock{};      ///< wall clock time from start to end
   std::int64_t memory = 0;           ///< [byte] of address space, beyond what the process has at the fork
 };
 
-/// Limits of `processor` seconds and `memory` bytes, and twelve times as long by the clock.
+/// Limits of `processor` seconds of processor time, twelve times that of wall clock time, and `memory` bytes.
 ChildLimits child_limits(std::chrono::seconds processor, std::int64_t memory);
 
-/// Limits for reading foreign files of `bytes` altogether and checking what is in them: meant to be far above
-/// what whole files take.
+/// Limits for reading and checking untrusted files of `bytes` in total: meant to be far above what valid
+/// files take.
 ChildLimits reading_limits(std::int64_t bytes);
 
-/// Who runs in a child, and what is said when it fails.
+/// A child's name, its limits and the texts for its failures.
 struct ChildTask {
   std::string name;   ///< program or library that runs there
-  std::string where;  ///< of the Error: the file
+  std::string where;  ///< `where` of the Error: the file
   ChildLimits limits;
-  std::string hint = "simplify, repair or remesh the input";  ///< when it crashes or reaches a limit
+  std::string hint = "simplify, repair or remesh the input";  ///< of the Error after a crash or at a limit
   std::vector<int> files{};  ///< descriptors, open for reading, that the work needs
-  /// A signal such as Ctrl-C ends the wait and the child. Without, signals of a host program are none of
-  /// ours.
+  /// Signals such as Ctrl-C end the wait and the child. If false, they are left to the host program.
   bool stop_at_signals = true;
 };
 
@@ -73,10 +71,10 @@ void append_array(Bytes& bytes, std::span<const T> values) {
   append_bytes(bytes, values);
 }
 
-/// Throws Error: a child's answer is not what it should be.
+/// Throws Error: the child's answer is malformed.
 [[noreturn]] void fail_on_answer();
 
-/// Takes an array from the front of `bytes`. Throws Error where they do not hold it.
+/// Takes an array from the front of `bytes`. Throws Error if they do not hold all of it.
 template <typename T>
 std::vector<T> take_array(std::span<const std::byte>& bytes) {
   std::size_t size = 0;

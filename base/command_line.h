@@ -1,4 +1,4 @@
-// What both programs' command lines have in common.
+// Parts common to both programs' command lines.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -59,7 +59,7 @@ class HelpFormatter : public CLI::Formatter {
 
   static constexpr std::size_t width = 100, column = 30;
 
-  /// Between words, with the lines after the first indented.
+  /// Breaks lines between words and indents all but the first.
   [[nodiscard]] static std::string wrapped(const std::string& text, std::size_t indent) {
     std::string result;
     std::size_t at = indent;
@@ -88,7 +88,7 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
-/// Refuses an empty word in place of any value: nothing is a name, a path or a number that has no letter.
+/// Refuses an empty word as any value: no name, path or number is empty.
 inline void refuse_empty_values(CLI::App& app) {
   for (CLI::Option* option :
        app.get_options([](const CLI::Option* each) { return each->get_expected_max() > 0; })) {
@@ -111,8 +111,7 @@ inline const CLI::App* find_command(const CLI::App& app, const std::string& name
   return commands.empty() ? nullptr : commands.front();
 }
 
-/// "Did you mean --device? " where a word that is no option of the command was probably meant as one; else
-/// nothing.
+/// "Did you mean --device? " if an unknown option is probably a misspelling of a known one, else "".
 inline std::string meant_option(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> names;
   for (const CLI::Option* option :
@@ -148,12 +147,12 @@ inline std::string help_page(const CLI::App& app, const std::string& command) {
   return formatter->make_help(found, app.get_name() + " " + command, CLI::AppFormatMode::Normal);
 }
 
-/// True if `--help=json` is all that was written.
+/// True if `--help=json` is the only argument.
 inline bool asks_for_json(int argc, char** argv) {
   return argc == 2 && std::string_view(argv[1]) == "--help=json";
 }
 
-/// Prints `help_json` of a program, with tables of its own by their names; returns exit_ok.
+/// Prints `help_json` of a program together with its own tables, by name; returns exit_ok.
 inline int print_help_json(const CLI::App& app, const nlohmann::ordered_json& tables) {
   nlohmann::ordered_json json = help_json(app);
   json["version"] = PALPATE_VERSION;

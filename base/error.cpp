@@ -11,7 +11,7 @@ namespace palpate {
 
 std::string to_text(const Error& error) {
   std::string hint = error.hint();
-  // Not where it begins with a name, such as edge_length or --jobs.
+  // Unless it begins with a name, such as edge_length or --jobs.
   const std::string first_word = hint.substr(0, hint.find(' '));
   if (first_word.find_first_of("_./-=") == std::string::npos && !hint.empty()) {
     hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));

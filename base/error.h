@@ -6,9 +6,8 @@
 
 namespace palpate {
 
-/// What a person is told when something cannot be done: one sentence, its place, and a way out.
-/// Thrown offline and at load, never in the tick; run_program catches it, prints `to_text` and exits with
-/// `exit_input_error`.
+/// An error for the user: one sentence, its place and a hint. Thrown offline and at load, never in the tick;
+/// run_program catches it, prints `to_text` and exits with `exit_input_error`.
 class Error : public std::runtime_error {
  public:
   /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to
@@ -24,18 +23,18 @@ class Error : public std::runtime_error {
   std::string hint_;
 };
 
-/// The two lines that a person sees: `error: WHERE: WHAT`, without WHERE where it is empty, and `hint: HINT`,
-/// which begins with a capital letter.
+/// The two printed lines: `error: WHERE: WHAT`, without WHERE if it is empty, and `hint: HINT`, which begins
+/// with a capital letter.
 std::string to_text(const Error& error);
 
-/// The exception that is being handled as an Error, which it may be: the lack of memory has `if_no_memory`
-/// for a hint, everything else is a mistake in the program. `where` is the place of these two.
+/// The exception being handled, as an Error: itself if it is one, a lack of memory with the hint
+/// `if_no_memory`, anything else as a bug in the program. `where` is the place of the last two.
 [[nodiscard]] Error handled_error(const std::string& where, const std::string& if_no_memory);
 
 /// Exit statuses of both programs. The reference of the book shows these comments.
 enum ExitCode : int {
   exit_ok = 0,           ///< done
-  exit_input_error = 1,  ///< bad input, bad file, no memory, full disk; or what was written is incomplete
+  exit_input_error = 1,  ///< bad input, bad file, no memory, full disk; or incomplete output
   exit_usage = 2,        ///< unknown, missing or wrong argument
   exit_differs = 3,  ///< `verify` found a difference or changed sources; a replay differs from its session
   exit_interrupted = 130,  ///< Ctrl-C, SIGTERM or SIGHUP; SIGUSR1 of a precomputation

@@ -48,10 +48,10 @@ const char* hint_for(int error) {
   throw Error("cannot " + doing + ": " + reason(error), path.string(), hint_for(error));
 }
 
-/// What is mapped where, as a signal handler can read it: without locks, in memory that is always there.
+/// A mapping and its file's name as a signal handler can read them: without locks, in static memory.
 struct NamedMapping {
   std::atomic<bool> taken = false;
-  std::atomic<std::uintptr_t> begin = 0, end = 0;  // nothing while end is 0
+  std::atomic<std::uintptr_t> begin = 0, end = 0;  // no mapping while end is 0
   std::array<char, 512> name = {};
 
   [[nodiscard]] bool holds(const void* address) const noexcept {
@@ -65,7 +65,7 @@ struct NamedMapping {
 };
 std::array<NamedMapping, 32> named_mappings;
 
-/// Null where there are too many.
+/// Records the name of a mapping; null if there are too many.
 NamedMapping* name_mapping(const void* base, std::size_t length, const std::filesystem::path& file) {
   for (NamedMapping& mapping : named_mappings) {
     if (mapping.taken.exchange(true)) continue;
@@ -78,7 +78,7 @@ NamedMapping* name_mapping(const void* base, std::size_t length, const std::file
   return nullptr;
 }
 
-/// Something that no run of ours can have left has the name of a file that we write on the way.
+/// Throws Error: the name of our temporary file belongs to something that no run of ours can have left.
 [[noreturn]] void refuse_stranger(const std::filesystem::path& path) {
   throw Error(
       std::string("is in the way: it is ") +

@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// An open file; closed when it goes.
+/// An open file, closed by the destructor.
 class FileDescriptor {
  public:
   FileDescriptor() = default;
@@ -40,27 +40,27 @@ enum class OpenMode : std::uint8_t {
 /// Opens a regular file and nothing else, without waiting. Throws Error with the reason.
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode);
 
-/// Locks the file for this program (flock) until it is closed; false where another one has it, after two
-/// seconds: a program that was killed lets go only when the last process that it forked is gone. True where
-/// the file system knows no locks.
+/// Locks the file for this program (flock) until it is closed. False if another program still has the lock
+/// after two seconds: a killed program keeps it until the last process that it forked has ended. True where
+/// the file system has no locks.
 bool lock_file(const FileDescriptor& file);
 
-/// Whether a program has it locked now.
+/// True if a program holds the lock now.
 bool is_locked(const FileDescriptor& file);
 
-/// [byte]
+/// Size of the file [byte].
 std::int64_t file_size(const FileDescriptor& file);
 
 /// Reads up to `into.size()` bytes at `offset`; returns how many, 0 at the end of the file. Throws Error.
 std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset);
 
-/// Reads exactly `into.size()` bytes at `offset`. Throws Error when the file ends before.
+/// Reads exactly `into.size()` bytes at `offset`. Throws Error if the file ends earlier.
 void read_exactly(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset);
 
-/// Writes all of `bytes` where the descriptor is. Returns 0, or the system's reason (errno).
+/// Writes all of `bytes` at the descriptor's position. Returns 0, or the system's reason (errno).
 int write_all(int fd, std::string_view bytes) noexcept;
 
-/// Throws Error with the system's reason (full disk, ...).
+/// Writes all of `bytes` at `offset`. Throws Error with the system's reason (full disk, ...).
 void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes, std::int64_t offset);
 
 /// Adds a line to a file opened with read_append. Throws Error.
@@ -70,43 +70,42 @@ void append_text(const FileDescriptor& file, std::string_view text);
 /// inside the file.
 std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
 
-/// Name of the file that `map_file` has mapped at an address, fit for a terminal; null where there is none,
-/// or it was one of very many. Signal handlers may ask.
+/// Name of the file that `map_file` has mapped at an address, made printable; null if there is none, or if
+/// too many were mapped to keep its name. Async-signal-safe.
 const char* mapped_file_at(const void* address) noexcept;
 
-/// Throws Error (needed, free) unless `needed` bytes fit beside `path`; what a file at `path` occupies counts
+/// Throws Error (needed, free) unless `needed` bytes fit beside `path`; the space of a file at `path` counts
 /// as free.
 void check_free_space(const std::filesystem::path& path, std::int64_t needed);
 
-/// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is
+/// Reserves the disk space of [offset, offset + bytes) if the file system can. Throws Error if the disk is
 /// full.
 void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
 
-/// Makes an empty file with the rights `mode` (less the umask) and opens it for writing; what already has the
-/// name is neither opened, followed nor replaced. Returns the descriptor, which the caller closes; -1 with
-/// errno where that cannot be.
+/// Creates an empty file with mode `mode` (less the umask) and opens it for writing. An existing file of that
+/// name is neither opened, followed nor replaced. Returns the descriptor, which the caller closes, or -1 with
+/// errno set.
 [[nodiscard]] int make_new_file(const std::filesystem::path& path, mode_t mode = 0666) noexcept;
 
-/// Makes an empty file, in the place of what a killed run may have left under the same temporary name. Throws
-/// Error where something that is not a regular file has that name, which is neither followed nor removed.
+/// Creates an empty temporary file in place of one that a killed run may have left. Throws Error if the name
+/// belongs to anything but a regular file, which is neither followed nor removed.
 void make_anew(const std::filesystem::path& temporary);
 
 /// Renames. Throws Error with the system's reason.
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Renames; where something has the name `to` already, a link to nothing too, it stays and false is returned.
-/// Throws Error with the system's reason.
+/// Renames without replacing: returns false if `to` exists, even as a dangling link. Throws Error with the
+/// system's reason.
 [[nodiscard]] bool rename_new(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Flushes what was written to the disk, on a file system of several machines to where all see it. Throws
-/// Error.
+/// Flushes written data to the disk; on a network file system, to where all machines see it. Throws Error.
 void flush(const FileDescriptor& file);
 
-/// Flushes `from` to the disk, then renames it; `keeps`: not in the place of what has the name already, for
-/// which it throws Error. Throws Error.
+/// Flushes `from` to the disk, then renames it. With `keeps`, an existing file is not replaced but an Error.
+/// Throws Error.
 void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to, bool keeps = false);
 
-/// "liver.palpate.hdf" + ".partial"
+/// The path with a suffix appended: "liver.palpate.hdf" + ".partial".
 std::filesystem::path with_suffix(const std::filesystem::path& path, const char* suffix);
 
 }  // namespace palpate

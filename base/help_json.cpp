@@ -5,7 +5,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The value that an option is given, as help shows it.
+/// Placeholder of an option's value, as help shows it.
 std::string shown_value(const CLI::Option& option) {
   if (!option.get_option_text().empty()) return option.get_option_text();
   return option.get_type_size() == 0 ? "" : option.get_type_name();

@@ -9,10 +9,10 @@
 
 namespace palpate {
 
-/// All arguments of a command, with those of its groups behind its own.
+/// All arguments of a command; those of its groups come last.
 [[nodiscard]] std::vector<const CLI::Option*> arguments_of(const CLI::App& app);
 
-/// Names of an option as they are typed, "-o" and "--output"; of a positional argument none.
+/// Names of an option as typed, "-o" and "--output"; none for a positional argument.
 [[nodiscard]] std::vector<std::string> option_names(const CLI::Option& option);
 
 /// A command or a whole program: its texts, arguments and commands, in the order of its help.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr char ending[] = "\ninterrupted: no columns were computed\n";
 
-// What a signal handler can reach.
+// State that the signal handler reads.
 std::atomic<bool> signalled{false};
 std::atomic<bool> noted_only{false};
 std::atomic<pid_t> owner{0};  // a child that was forked is silent

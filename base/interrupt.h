@@ -1,4 +1,4 @@
-// Ctrl-C, or a batch system's signal, while a file is being made.
+// Handling of Ctrl-C and of a batch system's signals while a file is written.
 #pragma once
 
 #include <array>
@@ -7,14 +7,14 @@
 
 namespace palpate {
 
-/// Ends the process with exit_interrupted if it is still there in 1.9 s, whatever it hangs in then; `text`
-/// (nullptr: nothing), which must stay, is printed. Signal handlers may call it. Takes SIGALRM.
+/// Ends the process with exit_interrupted in 1.9 s if it still runs then, whatever it hangs in, and prints
+/// `text` (nullptr: nothing), which must live until then. Async-signal-safe. Takes SIGALRM.
 void end_soon(const char* text) noexcept;
 
-/// While it lives, SIGINT, SIGTERM and SIGUSR1 end the process with exit_interrupted: at first at once, as
-/// there is nothing to keep, and after `note_from_now_on` by being noted, so that a block of columns is
-/// written whole and the person is told how to go on; what hangs then is ended by end_soon, unless the signal
-/// was SIGUSR1, which a batch system sends long before it kills. One at a time.
+/// While it lives, SIGINT, SIGTERM and SIGUSR1 end the process with exit_interrupted. At first they end it at
+/// once, as there is nothing to keep. After `note_from_now_on` they set a flag, so that a block of columns is
+/// written whole and the user learns how to continue; a process that hangs is then ended by end_soon, except
+/// after SIGUSR1, which a batch system sends long before it kills. One instance at a time.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -22,9 +22,10 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  /// Where a signal ends the process, this file is removed if it is empty.
+  /// Has this file removed, if it is empty, when a signal ends the process.
   void remove_if_empty(const std::string& file);
-  /// `text` is printed where the run does not end by itself. Empty: it may take as long as it needs.
+  /// Lets signals set a flag from now on. `text` is printed if the run does not end by itself; empty: it may
+  /// take as long as it needs.
   void note_from_now_on(const std::string& text);
   [[nodiscard]] bool requested() const noexcept;
 

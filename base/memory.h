@@ -1,4 +1,4 @@
-// How much memory there is, and memory on huge pages.
+// Available memory, and memory on huge pages.
 #pragma once
 
 #include <cstddef>
@@ -8,18 +8,17 @@
 
 namespace palpate {
 
-/// Memory that can be had without swapping, as the kernel estimates it (MemAvailable) [bytes]; 0 when it does
-/// not say.
+/// Memory available without swapping, as the kernel estimates it (MemAvailable) [byte]; 0 if unknown.
 std::int64_t available_memory();
 
-/// Zeroed memory that starts on a huge page, on huge pages where the kernel gives them: a tick touches few
-/// bytes on each of many rows. Null when there is none.
+/// Zeroed memory that starts on a huge page, on huge pages where the kernel grants them: a tick reads few
+/// bytes of each of many rows. Null if there is none.
 std::shared_ptr<void> map_memory(std::int64_t bytes);
 
-/// Memory for containers, on huge pages where it is large and the kernel gives them: who goes through a
-/// column of a matrix touches a page for each row. Throws std::bad_alloc.
+/// Memory for containers, on huge pages if it is large and the kernel grants them: reading a column of a
+/// matrix touches one page per row. Throws std::bad_alloc.
 void* allocate_large(std::size_t bytes);
-/// Frees what allocate_large gave.
+/// Frees memory of allocate_large.
 void free_large(void* memory) noexcept;
 
 /// The standard library's allocator over allocate_large.
@@ -36,7 +35,7 @@ struct LargeAllocator {
   friend bool operator==(const LargeAllocator&, const LargeAllocator&) noexcept { return true; }
 };
 
-/// A matrix that a tick goes through.
+/// Storage of a matrix that a tick traverses.
 template <class T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
 

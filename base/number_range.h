@@ -1,4 +1,4 @@
-// Numbers that a quantity may have, and the words for them.
+// Ranges of valid numbers, with words for messages.
 #pragma once
 
 #include <limits>
@@ -10,8 +10,8 @@ namespace palpate {
 struct NumberRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool has_low = false, has_high = false;  ///< the end itself is in it
-  std::string_view words = "finite";       ///< what a number must be to be in it
+  bool has_low = false, has_high = false;  ///< the bound itself is included
+  std::string_view words = "finite";       ///< the condition on a number, in words
 
   [[nodiscard]] constexpr bool contains(double x) const noexcept {
     return (x > low || (has_low && x == low)) && (x < high || (has_high && x == high));

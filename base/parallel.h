@@ -1,4 +1,4 @@
-// Work that is shared out among threads.
+// Loops run by several threads.
 #pragma once
 
 #include <atomic>
@@ -10,9 +10,9 @@
 
 namespace palpate {
 
-/// Calls work(item, worker) once for each item of [0, count), by `jobs` threads, each with a number of its
-/// own in [0, jobs). Items are taken in ascending order. Once a call throws no more are begun, and what it
-/// threw is thrown here.
+/// Calls work(item, worker) once for each item of [0, count) on `jobs` threads, which `worker` numbers in
+/// [0, jobs). Items are taken in ascending order. Once a call throws, no more are begun, and its exception is
+/// rethrown here.
 template <class Work>
 void parallel_for(std::int64_t count, int jobs, Work&& work) {
   std::atomic<std::int64_t> next{0};

@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-/// A character of a text: its number, or that of a byte that is no part of valid UTF-8.
+/// A character of a text: its code point, or the value of a byte that is not valid UTF-8.
 struct Character {
   std::uint32_t number = 0;
   std::size_t bytes = 1;
@@ -40,7 +40,7 @@ struct Range {
   std::uint32_t first, last;
 };
 
-/// Control characters, marks of direction, separators of lines, what is not seen, and tags.
+/// Control characters, bidirectional marks, line separators, invisible characters and tags.
 constexpr std::array<Range, 14> not_shown = {{{0x00, 0x1f},
                                               {0x7f, 0x9f},
                                               {0xad, 0xad},
@@ -89,7 +89,7 @@ std::string printable(std::string_view text, std::size_t longest) {
 }
 
 std::string shell_word(std::string_view path) {
-  const std::string text = (path.starts_with('-') ? "./" : "") + std::string(path);  // or it is an option
+  const std::string text = (path.starts_with('-') ? "./" : "") + std::string(path);  // else it is an option
   const auto is_plain = [](unsigned char c) {
     return c >= 0x80 || std::isalnum(c) != 0 ||
            std::string_view("%+,-./:=@_").find(static_cast<char>(c)) != std::string_view::npos;

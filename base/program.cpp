@@ -29,14 +29,14 @@ void prepare_output() {
       nullptr, "w", {.read = nullptr, .write = write_or_lose, .seek = nullptr, .close = nullptr});
   if (stream == nullptr) return;
   std::setvbuf(stream, nullptr, _IONBF, 0);
-  stderr = stream;  // which the GNU C library lets a program do
+  stderr = stream;  // the GNU C library allows this assignment
 }
 
 void tell(const Error& error) {
   std::fputs(to_text(error).c_str(), stderr);
 }
 
-/// What is printed arrives, or it is told that it has not.
+/// Flushes standard output, reports it if some of it was lost, and returns the exit status.
 int finish_output(int status) {
   const bool failed_before = std::ferror(stdout) != 0;
   errno = 0;
@@ -54,7 +54,7 @@ int run_and_tell(const std::string& name, const std::string& if_no_memory, const
   } catch (const Error& error) {
     tell(error);
   } catch (...) {
-    // finish_output tells what fmt throws where the standard output is full.
+    // finish_output reports what fmt throws when standard output is full.
     if (std::ferror(stdout) == 0) tell(handled_error(name, if_no_memory));
   }
   return exit_input_error;

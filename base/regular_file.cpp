@@ -55,7 +55,7 @@ void check_kind(mode_t mode, const std::filesystem::path& file) {
               S_ISDIR(mode) ? "Give the path of a file in it" : "Save what it gives as a file first");
 }
 
-/// Closes a descriptor when it goes.
+/// A descriptor, closed by the destructor.
 struct Descriptor {
   int fd;
   explicit Descriptor(int opened) : fd(opened) {}
@@ -68,9 +68,9 @@ struct Descriptor {
 
 int open_regular_file(const std::filesystem::path& file, int flags, const char* if_missing) {
   struct stat status = {};
-  // before opening: that alone can start what a device does
+  // before opening, which alone can make a device start something
   if (::stat(file.c_str(), &status) == 0) check_kind(status.st_mode, file);
-  // O_NONBLOCK: a FIFO that took its place is not waited for
+  // O_NONBLOCK: do not wait for a FIFO that took its place
   const int fd = ::open(file.c_str(), flags | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);
   if (fd < 0) fail("open", file, errno, if_missing);
   const int problem = ::fstat(fd, &status) == 0 ? 0 : errno;

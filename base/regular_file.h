@@ -12,8 +12,8 @@ namespace palpate {
 int open_regular_file(const std::filesystem::path& file, int flags,
                       const char* if_missing = "Check the path");
 
-/// Throws Error with the reason unless `file` is a regular file that may be read; `if_missing` is the hint
-/// for one that is not there.
+/// Throws Error with the reason unless `file` is a regular file that may be read; `if_missing` is the hint if
+/// it does not exist.
 void check_regular_file(const std::filesystem::path& file, const char* if_missing = "Check the path");
 
 /// All bytes of a regular file. Throws Error as check_regular_file does.

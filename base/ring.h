@@ -1,4 +1,4 @@
-// A queue from one thread to another, with neither waiting.
+// A queue between two threads, neither of which waits.
 #pragma once
 
 #include <atomic>
@@ -8,13 +8,13 @@
 
 namespace palpate {
 
-/// A bounded queue with one thread that pushes and one that pops. Neither call waits, locks or allocates.
+/// A bounded queue with one pushing and one popping thread. Neither call waits, locks or allocates.
 template <class T>
 class Ring {
  public:
   explicit Ring(std::size_t capacity) : slots_(capacity) {}
 
-  /// False, and `value` stays as it is, when it is full.
+  /// Returns false, with `value` unchanged, if the queue is full.
   bool push(T& value) noexcept {
     const std::size_t pushed = pushed_.load(std::memory_order_relaxed);
     if (pushed - popped_.load(std::memory_order_acquire) == slots_.size()) return false;
@@ -23,7 +23,7 @@ class Ring {
     return true;
   }
 
-  /// False when it is empty.
+  /// Returns false if the queue is empty.
   bool pop(T& value) noexcept {
     const std::size_t popped = popped_.load(std::memory_order_relaxed);
     if (popped == pushed_.load(std::memory_order_acquire)) return false;

@@ -1,4 +1,4 @@
-// How far words are from each other.
+// Edit distance, and suggestions for misspelt words.
 #pragma once
 
 #include <cstddef>
@@ -9,15 +9,15 @@
 
 namespace palpate {
 
-/// The fewest letters that are to be replaced, added or left out, or exchanged with their neighbour, to make
-/// one word of the other (the distance of Damerau and Levenshtein, no part changed twice).
+/// Smallest number of letters to replace, insert, delete, or swap with a neighbour that turns one word into
+/// the other (Damerau-Levenshtein distance, as optimal string alignment: no part is changed twice).
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The known word, of at least one, that takes the fewest changes of a letter (edit_distance).
+/// The known word with the smallest edit_distance. `known` is not empty.
 std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known);
 
-/// The known word, of at least one, that `word` is probably a slip of the pen from: at most one letter in
-/// three is another. Nothing where none is so near.
+/// The known word that `word` is probably a misspelling of: at most one letter in three differs. Nullopt if
+/// none is so near. `known` is not empty.
 std::optional<std::string> meant(std::string_view word, const std::vector<std::string_view>& known);
 
 }  // namespace palpate

@@ -1,4 +1,5 @@
-// A program that is a library: the loader takes the library's variant for the processor (glibc-hwcaps).
+// Entry point of a program that is a library, so that the loader takes its variant for the processor
+// (glibc-hwcaps).
 int palpate_main(int count, char** words);
 
 int main(int count, char** words) {

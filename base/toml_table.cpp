@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-/// "two numbers".
+/// A count in words: "two numbers".
 std::string some(std::size_t size, const std::string& things) {
   constexpr std::array words = {"no", "one", "two", "three", "four", "five", "six"};
   return std::string(words.at(size)) + " " + things;

@@ -16,11 +16,11 @@ namespace palpate {
 
 using Keys = std::vector<std::string_view>;
 
-/// `"a", "b" or "c"`.
+/// Keys as a message lists them: `"a", "b" or "c"`.
 std::string quoted_choice(const Keys& keys);
 
-/// One table of a TOML file. Its title is as a person would write it, "[mesh]"; that of the whole file is "".
-/// Values that are missing or of another type or range throw Error, and so do numbers that are not finite.
+/// One table of a TOML file. Its title is as written there, "[mesh]"; that of the whole file is "". Values
+/// that are missing, of the wrong type or out of range throw Error, and so do numbers that are not finite.
 /// Does not own the table.
 class TomlTable {
  public:
@@ -51,15 +51,16 @@ class TomlTable {
   [[nodiscard]] std::int32_t count(std::string_view key) const { return integer(key, 1); }
   [[nodiscard]] bool boolean(std::string_view key, bool fallback) const;
   [[nodiscard]] std::string text(std::string_view key) const;
-  /// One of the given texts.
+  /// A text that must be one of `choices`.
   [[nodiscard]] std::string choice(std::string_view key, const Keys& choices) const;
-  /// A list of some of the given texts.
+  /// A list of texts, each one of `choices`.
   [[nodiscard]] std::vector<std::string> choices(std::string_view key, const Keys& choices) const;
 
-  /// `size` numbers, 1 to 6.
+  /// List of `size` numbers (1 to 6).
   [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t size) const;
   [[nodiscard]] std::vector<double> positives(std::string_view key, std::size_t size) const;
-  /// `dimension` numbers, 2 or 3, the others 0. `hint` says what to write where they are not that many.
+  /// List of `dimension` numbers (2 or 3) as a vector, other components 0. `hint` is for a list of another
+  /// length.
   [[nodiscard]] Eigen::Vector3d vector(std::string_view key, int dimension,
                                        const std::string& hint = {}) const;
   [[nodiscard]] Eigen::Vector3d positive_vector(std::string_view key, int dimension) const;
@@ -67,7 +68,7 @@ class TomlTable {
   [[nodiscard]] std::vector<Eigen::Vector3d> points(std::string_view key) const;
   /// A list of lists of at least three pairs of numbers.
   [[nodiscard]] std::vector<std::vector<Eigen::Vector3d>> point_lists(std::string_view key) const;
-  /// `size` whole numbers, 1 to 6.
+  /// List of `size` whole numbers (1 to 6).
   [[nodiscard]] std::vector<std::int32_t> integers(std::string_view key, std::size_t size, std::int32_t low,
                                                    std::int32_t high = largest_integer) const;
   /// A list of at least one whole number.
@@ -75,19 +76,19 @@ class TomlTable {
   /// A list of at least one whole number or text.
   [[nodiscard]] std::pair<std::vector<std::int32_t>, std::vector<std::string>> integers_and_texts(
       std::string_view key) const;
-  /// `size` truth values, 1 to 6.
+  /// List of `size` truth values (1 to 6).
   [[nodiscard]] std::vector<bool> booleans(std::string_view key, std::size_t size) const;
 
   [[nodiscard]] TomlTable table(std::string_view key, const Keys& known) const;
-  /// The tables of a list [[key]], at least one; `hint` says what else to write where there are none.
+  /// Tables of a list [[key]], at least one; `hint` is for a list that is missing or empty.
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key, const Keys& known,
                                               const std::string& hint) const;
 
-  /// Throws Error that points at the value of `key`; at the table itself where it is empty or absent.
+  /// Throws Error located at the value of `key`, or at the table itself if `key` is empty or absent.
   [[noreturn]] void fail(std::string_view key, const std::string& what, const std::string& hint) const;
-  /// File, line and column of the value of `key`; of the table itself where it is empty or absent.
+  /// File, line and column of the value of `key`, or of the table itself if `key` is empty or absent.
   [[nodiscard]] std::string place_of(std::string_view key) const;
-  /// "[mesh] grading".
+  /// Name of a key in messages: "[mesh] grading".
   [[nodiscard]] std::string name_of(std::string_view key) const;
 
  private:
@@ -96,7 +97,7 @@ class TomlTable {
   [[noreturn]] void wrong_type(const toml::node& node, std::string_view key,
                                const std::string& expected) const;
   [[nodiscard]] const toml::node& required(std::string_view key) const;
-  /// `size` 0 is any size.
+  /// List of any size if `size` is 0.
   [[nodiscard]] const toml::array& array(std::string_view key, const std::string& expected,
                                          std::size_t size = 0) const;
   [[nodiscard]] double as_number(const toml::node& node, std::string_view key) const;

@@ -16,11 +16,11 @@ constexpr std::size_t most_bytes = 16'000'000;
 // through all tables and dotted keys so far for each of them.
 constexpr std::size_t most_parts = 16;
 constexpr std::size_t most_nested = 32;
-constexpr std::size_t most_tables = 50'000;  // and dots in keys
+constexpr std::size_t most_tables = 50'000;  // tables and dots in keys
 constexpr std::size_t longest_message = 200;
 
-/// Goes through a TOML text as its grammar does, without making anything of it. What is not valid TOML it may
-/// take for something else, but only after the place where the parser stops.
+/// Scanner of TOML text that follows its grammar and builds nothing. It may misread invalid TOML, but only
+/// after the place where the parser stops.
 class TomlScan {
  public:
   TomlScan(std::string_view text, const std::string& file) : text_(text), file_(file) {}

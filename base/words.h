@@ -1,4 +1,4 @@
-// Words of the messages about what somebody wrote.
+// Words and numbers as messages show them.
 #pragma once
 
 #include <cstddef>
@@ -8,16 +8,16 @@
 
 namespace palpate {
 
-/// "a, b, c".
+/// Words joined by commas: "a, b, c".
 std::string comma_list(const std::vector<std::string_view>& words);
 
-/// At most `most` bytes of what a file says, for a message: "..." stands for the rest.
+/// At most `most` bytes of a file's text, for a message; "..." stands for the rest.
 std::string shortened(std::string_view text, std::size_t most = 60);
 
-/// The shortest text that reads back as the same number, whatever the locale.
+/// Shortest text that reads back as the same number, independent of the locale.
 std::string shown(double value);
 
-/// A text as an attribute of XML in double quotes, or what stands between elements.
+/// A text escaped for XML, as an attribute in double quotes or as character data.
 std::string xml_escaped(std::string_view text);
 
 }  // namespace palpate

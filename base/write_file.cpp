@@ -44,7 +44,7 @@ std::string hint_to_write(int error) {
   throw Error(what, file.string(), "give the name of a file");
 }
 
-/// While it lives, a pipe without a reader is an error of the write and not the end of the program.
+/// While it lives, writing to a pipe without a reader is an error and does not end the program.
 class IgnoredPipeSignal {
  public:
   IgnoredPipeSignal() {
@@ -67,7 +67,7 @@ std::optional<struct stat> status_of(const std::filesystem::path& file) {
   return std::nullopt;
 }
 
-/// The descriptor of the standard stream that goes to the file with this status; -1 where none does.
+/// Descriptor of the standard stream that goes to the file with this status; -1 if none does.
 int standard_stream(const struct stat& status) {
   for (const int fd : {STDOUT_FILENO, STDERR_FILENO}) {
     struct stat open {};
@@ -139,7 +139,7 @@ FileWriter::FileWriter(const std::filesystem::path& file) {
     temporary_.emplace(link_target(file));
     return;
   }
-  std::fflush(stdout);  // what was printed before
+  std::fflush(stdout);  // text printed earlier
   const int fd = target == WriteTarget::stream ? open_stream(file) : ::dup(standard_stream(*status_of(file)));
   stream_ = FileDescriptor(fd, file);
 }

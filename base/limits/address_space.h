@@ -6,10 +6,10 @@
 
 namespace palpate {
 
-/// Address space that this process has [byte]; 0 when the system does not say.
+/// Address space of this process [byte]; 0 if unknown.
 std::int64_t address_space();
 
-/// Address space that this process may still take [byte]; nothing where it is not limited.
+/// Address space that this process may still take [byte]; nullopt if unlimited.
 std::optional<std::int64_t> address_room();
 
 }  // namespace palpate

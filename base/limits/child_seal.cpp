@@ -27,8 +27,8 @@ constexpr std::uint32_t machine = AUDIT_ARCH_AARCH64;
 constexpr std::uint32_t machine = 0;  // not known to us: no seal
 #endif
 
-/// System calls that what only computes makes, with any arguments. The C library and the sanitizers choose
-/// among those of a kind, and differ between their versions.
+/// System calls of code that only computes, allowed with any arguments. The C library and the sanitizers
+/// choose between equivalent calls, and differ between versions.
 constexpr auto allowed = std::to_array<std::uint32_t>({
     __NR_read,
     __NR_readv,
@@ -84,7 +84,7 @@ constexpr auto allowed = std::to_array<std::uint32_t>({
 #endif
 });
 
-/// A call that is allowed where an argument has this value.
+/// A system call that is allowed if an argument has this value.
 struct Allowance {
   std::uint32_t call;
   std::uint32_t argument;
@@ -99,7 +99,7 @@ constexpr sock_filter load(std::size_t offset) {
   return statement(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset));
 }
 
-/// Goes on where the loaded word is `value`, and else past the next `skipped` steps.
+/// Continues if the loaded word is `value`, else skips `skipped` steps.
 constexpr sock_filter only_if(std::uint32_t value, std::uint8_t skipped) {
   return {BPF_JMP | BPF_JEQ | BPF_K, 0, skipped, value};
 }
@@ -107,7 +107,7 @@ constexpr sock_filter only_if(std::uint32_t value, std::uint8_t skipped) {
 constexpr sock_filter allow = statement(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
 constexpr sock_filter refuse = statement(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM);
 
-/// Closes [first, last].
+/// Closes the descriptors [first, last].
 void close_all(int first, int last) {
   if (first > last) return;
 #ifdef __NR_close_range
@@ -123,7 +123,7 @@ void close_all(int first, int last) {
 void close_all_but(std::span<const int> kept) {
   int first = STDERR_FILENO + 1;
   for (;;) {
-    int next = -1;  // the least of those kept, from `first` on
+    int next = -1;  // smallest kept descriptor from `first` on
     for (const int fd : kept)
       if (fd >= first && (next < 0 || fd < next)) next = fd;
     if (next < 0) break;
