@@ -20,7 +20,7 @@ std::string text(const Vec3& x, int dimension) {
   return fmt::format("({:.4g}, {:.4g}, {:.4g})", x.x(), x.y(), x.z());
 }
 
-/// Mean of the corners.
+/// Mean of an element's corners.
 Vec3 centre_of(const Mesh& mesh, Index e) {
   return element_nodes(mesh, e).topRows(traits(mesh.element).corners).colwise().mean().transpose();
 }
@@ -50,13 +50,13 @@ std::string remake_hint(const Mesh& mesh) {
              : "Remake the mesh with a bound on the quality of its elements";
 }
 
-/// Volumes that are smaller count as zero.
+/// Volume below which an element counts as flat.
 double smallest_volume(const ElementNodes& x, int dimension) {
   const double longest = (x.rowwise() - x.row(0)).rowwise().norm().maxCoeff();
   return 1e-12 * std::pow(longest, dimension);
 }
 
-/// Turns elements of negative volume and returns how many. Throws where one has none.
+/// Reverses elements of negative volume and returns how many. Throws Error for one without volume.
 std::size_t turn_inverted(Mesh& mesh, const std::string& where) {
   const int d = mesh.dimension();
   const std::span<const std::uint8_t> order = reversed_nodes(mesh.element);
@@ -79,7 +79,8 @@ std::size_t turn_inverted(Mesh& mesh, const std::string& where) {
   return inverted;
 }
 
-/// A positive volume does not keep quad4, tet10 and hex8 from folding over at a corner.
+/// Throws Error for quad4, tet10 and hex8 that fold over at a corner, which a positive volume does not
+/// exclude.
 void check_not_folded(const Mesh& mesh, const std::string& where) {
   for (Index e = 0; e < mesh.elements(); ++e) {
     const ElementNodes x = element_nodes(mesh, e);
@@ -104,7 +105,7 @@ struct RigidMotions {
   const std::vector<std::uint8_t>& fixed;
   Vec3 centre = Vec3::Zero();
   double size = 0.0;
-  std::vector<Eigen::Index> possible;  // which of the six there are: in the plane two slide and one turns
+  std::vector<Eigen::Index> possible;  // of the six; in the plane two translations and a rotation
 
   RigidMotions(const Mesh& body, const std::vector<std::uint8_t>& held) : mesh(body), fixed(held) {
     possible = mesh.dimension() == 3 ? std::vector<Eigen::Index>{0, 1, 2, 3, 4, 5}
@@ -116,7 +117,7 @@ struct RigidMotions {
     for (const Vec3& x : mesh.nodes) size = std::max(size, (x - centre).norm());
   }
 
-  /// How far each motion moves each held dof. [held dofs, motions]
+  /// Displacement of each held dof by each motion. [held dofs, motions]
   [[nodiscard]] Eigen::MatrixXd at_held_dofs() const {
     std::vector<Motion> rows;
     for (std::size_t node = 0; node < fixed.size(); ++node) {
@@ -149,12 +150,12 @@ struct RigidMotions {
   }
 };
 
-/// Rounding that would only clutter a message.
+/// x with rounding errors set to zero, for messages.
 Vec3 rounded(const Vec3& x, double size) {
   return (x.array().abs() < 1e-9 * size).select(Vec3::Zero(), x);
 }
 
-/// A motion that turns, about a coordinate axis where there is one.
+/// One of the remaining motions, preferably a rotation about a coordinate axis.
 Motion a_turning_motion(const Eigen::MatrixXd& left) {
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::MatrixXd turning = left.bottomRows(3);
@@ -164,7 +165,7 @@ Motion a_turning_motion(const Eigen::MatrixXd& left) {
   return left.col(left.cols() - 1);
 }
 
-/// "turn about the axis through (0, 0, 0) m along (0, 0, 1)"
+/// Text for a rotation: "turn about the axis through (0, 0, 0) m along (0, 0, 1)".
 std::string turning_text(const RigidMotions& motions, const Eigen::MatrixXd& left) {
   const Motion motion = a_turning_motion(left);
   const Vec3 t = motion.head(3), w = motion.tail(3);
@@ -223,7 +224,7 @@ void check_connected(const Mesh& mesh, const std::string& where) {
     parent[find_root(parent, static_cast<std::size_t>(sides[i].element))] =
         find_root(parent, static_cast<std::size_t>(sides[i - 1].element));
   }
-  std::map<std::size_t, std::size_t> part_sizes;  // by the element that stands for the part
+  std::map<std::size_t, std::size_t> part_sizes;  // by the element that represents the part
   for (std::size_t e = 0; e < elements; ++e) ++part_sizes[find_root(parent, e)];
   if (part_sizes.size() == 1) return;
   std::string parts;
@@ -274,7 +275,7 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
 }
 
 std::string scale_warning(const Mesh& mesh, double scale) {
-  constexpr double smallest = 1e-3, largest = 10.0;  // [m] that are no surprise
+  constexpr double smallest = 1e-3, largest = 10.0;  // [m] plausible lengths of a body
   Eigen::AlignedBox3d box;
   for (const Vec3& x : mesh.nodes) box.extend(x);
   const double size = box.sizes().maxCoeff();

@@ -1,4 +1,4 @@
-// Middles of edges as nodes.
+// Middle nodes of edges.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Middles of edges that are not listed though both ends are, ascending: a file that has corners alone has no
-/// numbers for them. Numbers out of range count for nothing.
+/// Middle nodes, not listed themselves, of edges both of whose ends are listed; ascending. Files that know
+/// corners alone have no numbers for them. Numbers out of range are ignored.
 std::vector<Index> middles_between(const Mesh& mesh, const std::vector<Index>& listed);
 
 }  // namespace palpate

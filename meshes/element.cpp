@@ -17,7 +17,7 @@ constexpr std::array<Corner, 4> quad_corners = {{{-1, -1, 0}, {1, -1, 0}, {1, 1,
 constexpr std::array<Corner, 8> hex_corners = {
     {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}}};
 
-/// Which two corners each middle node lies between, in VTK's order.
+/// The two corners on either side of each middle node, in VTK's order.
 constexpr std::array<std::array<int, 2>, 3> triangle_middles = {{{0, 1}, {1, 2}, {2, 0}}};
 constexpr std::array<std::array<int, 2>, 6> tet_middles = {{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
 
@@ -107,7 +107,8 @@ std::vector<Vec3> make_nodes(ElementType type) {
   return nodes;
 }
 
-/// Points whose barycentric coordinates are `a` but for one, or (`pairs`) but for two that are 1/2 - a.
+/// Adds the points whose barycentric coordinates are all `a` except one, or (`pairs`) except two that are
+/// 1/2 - a.
 void add_orbit(std::vector<QuadraturePoint>& rule, double a, double weight, bool pairs) {
   for (int i = 0; i < 4; ++i) {
     for (int j = pairs ? i + 1 : i; j < (pairs ? 4 : i + 1); ++j) {
@@ -118,8 +119,8 @@ void add_orbit(std::vector<QuadraturePoint>& rule, double a, double weight, bool
   }
 }
 
-/// Points that integrate N_i N_j exactly: of degree 2 for tri3 and tet4, of 5 for tet10 (Walkington 2000, 14
-/// points); those of the stiffness do it on quad4 and hex8.
+/// Quadrature that integrates N_i N_j exactly: degree 2 for tri3 and tet4, degree 5 for tet10 (Walkington
+/// 2000, 14 points); for quad4 and hex8 the points of the stiffness suffice.
 std::vector<QuadraturePoint> make_mass_rule(ElementType type) {
   std::vector<QuadraturePoint> rule;
   if (type == ElementType::tri3) {

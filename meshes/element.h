@@ -51,42 +51,41 @@ struct MappedGradients {
 };
 MappedGradients mapped_gradients(ElementType type, const ElementNodes& x, const Vec3& xi);
 
-/// Measure of the map of a facet (line2, tri3, tri6, quad4) in space at xi: length or area a unit of
-/// reference.
+/// Length or area of a facet (line2, tri3, tri6, quad4) in space per unit of the reference facet, at xi.
 double facet_measure(ElementType type, const ElementNodes& x, const Vec3& xi);
 
 /// Volume of the element [m^3]; in the plane its area [m^2].
 double element_volume(ElementType type, const ElementNodes& x);
 
-/// The smallest determinant of the map at quadrature points and corners: positive for a valid element.
+/// Smallest determinant of the map at quadrature points and corners: positive for a valid element.
 double smallest_determinant(ElementType type, const ElementNodes& x);
 
-/// B with B u_e = [eps_xx eps_yy eps_zz gamma_xy gamma_yz gamma_zx], in the plane [eps_xx eps_yy gamma_xy];
-/// u_e node-major.
+/// Strain matrix B: B u_e = [eps_xx eps_yy eps_zz gamma_xy gamma_yz gamma_zx], in the plane
+/// [eps_xx eps_yy gamma_xy]; u_e node-major.
 StrainMatrix strain_matrix(const ShapeGradients& gradients);
 
-/// K_e = integral of t B^T D B [N/m]; `thickness` t [m] counts in the plane, give 1 in space.
+/// K_e = integral of t B^T D B [N/m]; `thickness` t [m] is that of a plane body, 1 in space.
 ElementMatrix element_stiffness(ElementType type, const ElementNodes& x, const ElasticityMatrix& D,
                                 double thickness);
 
-/// Integral of t density N_i N_j over the element [kg], the same along every axis: the consistent mass
-/// matrix. Exact on straight-edged simplices and on affine quad4 and hex8.
+/// Consistent mass matrix: the integral of t density N_i N_j over the element [kg], the same along every
+/// axis. Exact on straight-edged simplices and on affine quad4 and hex8.
 using ElementMass =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_element_nodes, max_element_nodes>;
 ElementMass element_mass(ElementType type, const ElementNodes& x, double density, double thickness);
 
-/// Diagonal of the lumped mass matrix [kg]: that of the consistent one, scaled so that the element's mass
-/// stays (Hinton, Rock and Zienkiewicz 1976); positive for every kind of element.
+/// Diagonal of the lumped mass matrix [kg]: that of the consistent one, scaled to keep the element's mass
+/// (Hinton, Rock and Zienkiewicz 1976); positive for every kind of element.
 ShapeValues element_lumped_mass(ElementType type, const ElementNodes& x, double density, double thickness);
 
 /// Integral of t B^T sigma for a constant stress [N], e.g. D eps_0 (Fagerholt eq. 3.25-3.30).
 ElementVector element_stress_force(ElementType type, const ElementNodes& x, const StressVector& stress,
                                    double thickness);
 
-/// Integral of t N_i over the element [m^3]: times a body force [N/m^3] it is the nodal force.
+/// Integral of t N_i over the element [m^3]; times a body force [N/m^3] it is the nodal force.
 ShapeValues element_shape_integrals(ElementType type, const ElementNodes& x, double thickness);
 
-/// Integral of t N_i over a facet [m^2]: times a traction [N/m^2] it is the nodal force.
+/// Integral of t N_i over a facet [m^2]; times a traction [N/m^2] it is the nodal force.
 ShapeValues facet_shape_integrals(ElementType type, const ElementNodes& x, double thickness);
 
 }  // namespace palpate

@@ -11,12 +11,12 @@ namespace palpate {
 /// then the middles of the edges (tri6: 01 12 20; tet10: 01 12 20 03 13 23).
 enum class ElementType : std::uint8_t { line2, tri3, tri6, quad4, tet4, tet10, hex8 };
 
-/// What is constant of a kind of element.
+/// Constants of a kind of element.
 struct ElementTraits {
   ElementType type;
-  const char* name;   ///< as in model.toml
+  const char* name;   ///< name in model.toml
   int dimension;      ///< of its reference coordinates
-  int nodes;          ///< nodes an element
+  int nodes;          ///< number of nodes
   int corners;        ///< the first nodes, which fix the straight-edged shape
   int edges;          ///< straight edges
   int facets;         ///< sides
@@ -34,7 +34,7 @@ inline constexpr std::array<ElementTraits, 7> element_traits = {{
     {ElementType::hex8, "hex8", 3, 8, 8, 12, 6, ElementType::quad4, 12},
 }};
 
-/// The kinds that a body can be made of.
+/// Kinds of elements that bodies are made of.
 inline constexpr std::array<ElementType, 5> body_elements = {
     ElementType::tri3, ElementType::quad4, ElementType::tet4, ElementType::tet10, ElementType::hex8};
 
@@ -42,7 +42,7 @@ constexpr const ElementTraits& traits(ElementType type) noexcept {
   return element_traits[static_cast<std::size_t>(type)];
 }
 
-/// Most nodes an element has.
+/// Largest number of nodes of an element.
 inline constexpr int max_element_nodes = 10;
 
 }  // namespace palpate

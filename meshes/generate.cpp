@@ -27,7 +27,7 @@ std::vector<Vec3> grid_nodes(const std::array<int, 3>& cells) {
   return nodes;
 }
 
-/// Steps of the node number along the axes.
+/// Increments of the node number along the axes.
 std::array<Index, 3> strides(const std::array<int, 3>& cells) {
   return {1, cells[0] + 1, (cells[0] + 1) * (cells[1] + 1)};
 }
@@ -129,7 +129,7 @@ class MiddleNodes {
   std::unordered_map<std::uint64_t, Index> middles_;
 };
 
-/// Elements or facets of first order with their middles.
+/// Connectivity of first-order elements or facets, with their middle nodes added.
 std::vector<Index> with_middles(const std::vector<Index>& connectivity, ElementType linear,
                                 MiddleNodes& middles, std::vector<Vec3>& nodes) {
   const auto width = static_cast<std::size_t>(traits(linear).nodes);

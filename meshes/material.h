@@ -7,14 +7,14 @@
 
 namespace palpate {
 
-/// How strain and stress are tied together.
+/// Kind of analysis, which determines the elasticity matrix.
 enum class Analysis : std::uint8_t {
   solid,         ///< three dimensions
   plane_stress,  ///< thin sheet: no stress across it
   plane_strain,  ///< slice of a long body: no strain along it
 };
 
-/// D [6 x 6], in the plane [3 x 3].
+/// Elasticity matrix D [6 x 6], in the plane [3 x 3].
 using ElasticityMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
 /// Stress [xx yy zz xy yz zx], in the plane [xx yy xy] [Pa].
 using StressVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
@@ -25,7 +25,7 @@ struct Material {
   double poissons_ratio = 0.0;  ///< nu [-]
   double density = 1000.0;      ///< [kg/m^3]
   double friction = 0.0;        ///< Coulomb's coefficient between its surface and a tool [-], >= 0
-  /// eps_0 [xx yy zz xy yz zx], engineering shear: the strain of the material where it is free of stress
+  /// eps_0 [xx yy zz xy yz zx], engineering shear: the strain at which the material is free of stress
   /// (swelling, thermal expansion).
   std::array<double, 6> initial_strain{};
 };
@@ -33,8 +33,8 @@ struct Material {
 /// D of sigma = D (epsilon - eps_0) for engineering strain, shear gamma = 2 epsilon (theory.md section 1).
 ElasticityMatrix elasticity_matrix(const Material& material, Analysis analysis = Analysis::solid);
 
-/// D eps_0: the stress that would be needed to keep the initial strain away. In plane strain eps_0,zz counts
-/// through Poisson's ratio; in plane stress it is free.
+/// D eps_0: the stress that suppresses the initial strain. In plane strain eps_0,zz counts through Poisson's
+/// ratio; in plane stress it is free.
 StressVector initial_stress(const Material& material, Analysis analysis = Analysis::solid);
 
 }  // namespace palpate

@@ -1,5 +1,5 @@
 // The table of a material's constants. Description, baked file, checks, inspection and documentation walk it,
-// so a constant that is added here is read, stored, loaded, checked and shown.
+// so that a constant added here is read, stored, loaded, checked and shown.
 #pragma once
 
 #include <span>
@@ -10,20 +10,20 @@
 
 namespace palpate {
 
-/// A constant of a material, or several under one name.
+/// One constant of a material, or several under one name.
 struct MaterialField {
-  std::string_view key;      ///< in model.toml
-  std::string_view dataset;  ///< in the baked file, a row a material; neighbours in the table may share one
-  std::string_view symbol;   ///< for people
+  std::string_view key;      ///< key in model.toml
+  std::string_view dataset;  ///< baked dataset, a row per material; neighbours in the table may share one
+  std::string_view symbol;   ///< name in the output of inspect
   std::string_view unit;     ///< SI, empty for a pure number
-  bool required = false;     ///< else the default of `Material` holds where it is left out
+  bool required = false;     ///< if not, the default of `Material` applies when it is left out
   NumberRange range{};
-  std::string_view meaning;  ///< as the documentation tells it
-  std::string_view hint;     ///< what to give
+  std::string_view meaning;  ///< text of the reference
+  std::string_view hint;     ///< hint for a value that is missing or out of range
 };
 
 /// Calls visit(field, numbers) for each constant, in the order of the baked file; `numbers` is a span of the
-/// material's own. A member that is added to Material must be named here, or nothing compiles.
+/// material's own members. A member added to Material must be named here, else nothing compiles.
 template <class SomeMaterial, class Visitor>
 void for_each_material_field(SomeMaterial&& material, Visitor&& visit) {
   auto& [youngs_modulus, poissons_ratio, density, friction, initial_strain] = material;

@@ -1,4 +1,4 @@
-// What a body is before physics: nodes, elements and the tags that the mesh file gave them.
+// Mesh of a body: nodes, elements and the tags from its mesh file.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,15 +23,15 @@ using Triangle = std::array<Index, 3>;  ///< node numbers, counter-clockwise see
 struct Mesh {
   ElementType element = ElementType::tet4;
   std::vector<Vec3> nodes;          ///< [N] positions [m]
-  std::vector<Index> connectivity;  ///< [E * nodes an element] node numbers, positively oriented
+  std::vector<Index> connectivity;  ///< [E * nodes per element] node numbers, positively oriented
   std::vector<Index> regions;       ///< [E] region tag of each element; 0 where the source has none
 
-  /// Boundary facets that carry a tag in their mesh file (Gmsh physical group, Medit reference, TetGen
-  /// marker), possibly none: [T * nodes a facet] node numbers in any sense, and [T] tags.
+  /// Boundary facets with a tag in the mesh file (Gmsh physical group, Medit reference, TetGen marker),
+  /// possibly none: [T * nodes per facet] node numbers in any sense, and [T] tags.
   std::vector<Index> tagged_facets{};
   std::vector<Index> facet_tags{};
 
-  /// 2 or 3: of the space that the body moves in, and so dofs a node.
+  /// Dimension of the space that the body moves in, 2 or 3; also the number of dofs per node.
   [[nodiscard]] int dimension() const noexcept { return traits(element).dimension; }
   [[nodiscard]] Index elements() const noexcept {
     return static_cast<Index>(connectivity.size() / static_cast<std::size_t>(traits(element).nodes));

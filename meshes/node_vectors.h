@@ -1,4 +1,4 @@
-// Vectors of nodes in arrays of dofs: d numbers a node, in space for everybody else.
+// Node vectors in arrays of dofs: d numbers per node in the array, vectors in space in the code.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// The `dimension` numbers of node k as a vector in space; z = 0 in the plane.
+/// Vector of node k from its `dimension` numbers; z = 0 in the plane.
 inline Vec3 vector_at(std::span<const double> values, int dimension, Index k) noexcept {
   const double* v = values.data() + std::ptrdiff_t{dimension} * k;
   return {v[0], v[1], dimension == 3 ? v[2] : 0.0};

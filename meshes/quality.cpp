@@ -25,7 +25,7 @@ Vec3 node(const ElementNodes& x, Eigen::Index i) {
   return x.row(i).transpose();
 }
 
-/// Between two directions, from 0 to 180 degrees.
+/// Angle between two directions [degree], from 0 to 180.
 double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
 }
@@ -35,7 +35,7 @@ double angle_about(const Vec3& edge, const Vec3& a, const Vec3& b) {
   return angle_between(edge.cross(a), edge.cross(b));
 }
 
-/// Corner angles; 2 r_in / R_circum = 16 A^2 / (a b c (a + b + c)).
+/// Quality of a triangle: corner angles, and 2 r_in / R_circum = 16 A^2 / (a b c (a + b + c)).
 ElementQuality triangle_quality(const ElementNodes& x) {
   ElementQuality quality{Angles(3), 0.0};
   double perimeter = 0.0, product = 1.0;
@@ -50,7 +50,7 @@ ElementQuality triangle_quality(const ElementNodes& x) {
   return quality;
 }
 
-/// Corner angles; the smallest sine of them, negative beyond 180 degrees.
+/// Quality of a quadrilateral: corner angles, and the smallest sine of them, negative beyond 180 degrees.
 ElementQuality quad_quality(const ElementNodes& x) {
   ElementQuality quality{Angles(4), std::numeric_limits<double>::infinity()};
   for (Eigen::Index i = 0; i < 4; ++i) {
@@ -61,8 +61,8 @@ ElementQuality quad_quality(const ElementNodes& x) {
   return quality;
 }
 
-/// 3 r_in / R_circum. r_in = 3 V / (sum of the faces' areas); R from the products of opposite edges (Crelle's
-/// formula).
+/// Radius ratio 3 r_in / R_circum. r_in = 3 V / (sum of the faces' areas); R from the products of opposite
+/// edges (Crelle's formula).
 double tet_radius_ratio(const ElementNodes& x) {
   const auto length = [&](Eigen::Index i, Eigen::Index j) { return (x.row(i) - x.row(j)).norm(); };
   const auto doubled_area = [&](Eigen::Index i, Eigen::Index j, Eigen::Index k) {
@@ -80,7 +80,7 @@ double tet_radius_ratio(const ElementNodes& x) {
 }
 
 ElementQuality tet_quality(const ElementNodes& x) {
-  // Edge, and the two corners that are not on it.
+  // Ends of each edge, and the two corners that are not on it.
   static constexpr std::array<std::array<Eigen::Index, 4>, 6> edges = {
       {{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 0, 1, 3}, {0, 3, 1, 2}, {1, 3, 0, 2}, {2, 3, 0, 1}}};
   ElementQuality quality{Angles(6), tet_radius_ratio(x)};
@@ -92,8 +92,8 @@ ElementQuality tet_quality(const ElementNodes& x) {
   return quality;
 }
 
-/// Dihedral angles at the edges, the mean of those at both ends (its faces may be warped); the smallest
-/// determinant of the three unit edges at a corner.
+/// Quality of a hexahedron: dihedral angles at the edges, the mean of both ends (faces may be warped), and
+/// the smallest determinant of the three unit edges at a corner.
 ElementQuality hex_quality(const ElementNodes& x) {
   static constexpr std::array<std::array<Eigen::Index, 3>, 8> neighbours = {
       {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}}};

@@ -22,8 +22,8 @@ struct QualityReport {
   double min_edge = 0.0;                             ///< [m]
   double max_edge = 0.0;                             ///< [m]
   double volume = 0.0;                               ///< of the whole body [m^3]; in the plane its area [m^2]
-  Index worst_element = 0;                           ///< the element with the smallest shape
-  Vec3 worst_centroid = Vec3::Zero();                ///< where it is [m]
+  Index worst_element = 0;                           ///< element with the smallest shape
+  Vec3 worst_centroid = Vec3::Zero();                ///< its centroid [m]
   std::array<std::int64_t, bins> angle_histogram{};  ///< number of angles in each bin
 };
 

@@ -38,14 +38,14 @@ struct SelectLowest {
 using Selection =
     std::variant<SelectBox, SelectHalfSpace, SelectSphere, SelectNodes, SelectTag, SelectLowest>;
 
-/// Marks the selected nodes [N] (1 = selected). Distances are compared with a tolerance of 1e-9 of the body's
-/// size. Throws Error (where = `where`) when nothing is selected, a node number is out of range or a tag is
-/// unknown (names those that exist).
+/// Marks the selected nodes [N] (1 = selected). Distances have a tolerance of 1e-9 of the body's size. Throws
+/// Error (where = `where`) if nothing is selected, a node number is out of range or a tag is unknown (the
+/// message lists the tags there are).
 std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection,
                                        const std::string& where);
 
-/// Marks the elements whose centroid (of the corners) the selection holds [E]. Boxes, half spaces, spheres
-/// and lowest parts only; throws Error for lists of nodes and for tags, and when nothing is selected.
+/// Marks the elements whose centroid (of the corners) is in the selection [E]. For boxes, half spaces,
+/// spheres and lowest parts; throws Error for lists of nodes and for tags, and if nothing is selected.
 std::vector<std::uint8_t> select_elements(const Mesh& mesh, const Selection& selection,
                                           const std::string& where);
 

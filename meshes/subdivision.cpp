@@ -16,7 +16,7 @@ namespace {
 
 using Lattice = std::array<int, 3>;
 
-/// Gathers nodes, each once.
+/// List of nodes without duplicates.
 class NodeList {
  public:
   explicit NodeList(Subdivision& result) : result_(result) {}
@@ -43,9 +43,9 @@ void for_each_cell(int d, int r, Visit&& visit) {
   }
 }
 
-/// Cuts a simplex. With ranked corners v_0 v_1 .. the point (x) of the lattice r >= x_1 >= x_2 >= .. >= 0 is
-/// v_0 + x_1/r (v_1 - v_0) + x_2/r (v_2 - v_1) + ..; Kuhn's simplices of the lattice's cells that are within
-/// are the children.
+/// Subdivision of a simplex. With ranked corners v_0 v_1 .. the point (x) of the lattice
+/// r >= x_1 >= x_2 >= .. >= 0 is v_0 + x_1/r (v_1 - v_0) + x_2/r (v_2 - v_1) + ..; the children are Kuhn's
+/// simplices, inside it, of the lattice's cells.
 class SimplexCut {
  public:
   SimplexCut(ElementType type, int r, const std::array<int, 4>& order, Subdivision& result)
@@ -90,7 +90,7 @@ class SimplexCut {
     return weights;
   }
 
-  /// The node with whole-number barycentric weights.
+  /// Adds the node with these integer barycentric weights.
   void add_node(const Weights& weights) {
     Vec3 xi = Vec3::Zero();
     for (int axis = 0; axis < d_; ++axis)
@@ -98,7 +98,7 @@ class SimplexCut {
     result_.connectivity.push_back(nodes_.find(weights, xi));
   }
 
-  /// Kuhn's simplex of the cell that goes along `axes` one after the other, where it is within.
+  /// Adds Kuhn's simplex of the cell along `axes`, one after the other, if it is inside.
   void add_child(const Lattice& cell, const std::array<int, 3>& axes) {
     std::array<Lattice, 4> path{cell};
     for (std::size_t k = 0; k < static_cast<std::size_t>(d_); ++k) {

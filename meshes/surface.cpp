@@ -14,14 +14,15 @@ namespace {
 
 constexpr const char* remove_overlap = "Remove the elements that overlap or stand twice in the mesh";
 
-/// "face of nodes 3, 7, 9"
+/// Text for a side: "face of nodes 3, 7, 9".
 std::string text(const Mesh& mesh, const ElementSide& side) {
   const auto corners = static_cast<std::ptrdiff_t>(traits(traits(mesh.element).facet).corners);
   return fmt::format("{} of nodes {}", mesh.dimension() == 3 ? "face" : "side",
                      fmt::join(side.corners.begin(), side.corners.begin() + corners, ", "));
 }
 
-/// Two elements that share the corners of a side must see it from both sides, and share its middles too.
+/// Throws Error unless two elements that share the corners of a side lie on both sides of it and share its
+/// middles.
 void check_pair(const Mesh& mesh, const ElementSide& one, const ElementSide& other) {
   std::vector<Index> a = side_nodes(mesh, one), b = side_nodes(mesh, other);
   const auto corners = static_cast<std::ptrdiff_t>(traits(traits(mesh.element).facet).corners);

@@ -10,9 +10,10 @@ namespace palpate {
 /// Facets that belong to exactly one element, oriented outwards, and the nodes on them.
 struct Surface {
   ElementType facet = ElementType::tri3;  ///< kind of the facets: line2 in the plane
-  std::vector<Index> facets;              ///< [F * nodes a facet] mesh node numbers; outward normal by the
-                              ///< right-hand rule, in the plane to the right of the line from node 0 to 1
-  std::vector<Index> nodes;  ///< [S] mesh node numbers on the boundary, ascending
+  std::vector<Index> facets;              ///< [F * nodes per facet] mesh node numbers; outward normal by the
+                                          ///< right-hand rule, in the plane to the right of the line from
+                                          ///< node 0 to 1
+  std::vector<Index> nodes;               ///< [S] mesh node numbers on the boundary, ascending
 
   [[nodiscard]] Index count() const noexcept {
     return static_cast<Index>(facets.size() / static_cast<std::size_t>(traits(facet).nodes));
@@ -23,12 +24,12 @@ struct Surface {
   }
 };
 
-/// Extracts the boundary. Expects positively oriented elements; throws Error where more than two elements
-/// share a facet, or two are on the same side of it.
+/// Extracts the boundary. Expects positively oriented elements; throws Error if more than two elements share
+/// a facet, or two are on the same side of it.
 Surface extract_surface(const Mesh& mesh);
 
-/// The surface as linear simplices: triangles in space (a quad4 facet is cut into two, a tri6 into the four
-/// of its middles), lines in the plane. [simplices * d] mesh node numbers, oriented as the facets.
+/// The surface as linear simplices: triangles in space (a quad4 facet is cut into two, a tri6 into four at
+/// its middle nodes), lines in the plane. [simplices * d] mesh node numbers, oriented as the facets.
 std::vector<Index> surface_simplices(const Surface& surface);
 
 /// The nodes on a surface, numbered from 0.

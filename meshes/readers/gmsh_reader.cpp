@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// Gmsh's numbers of the elements that are read, and its order of nodes.
+/// The element of a Gmsh type number, with Gmsh's order of nodes; null for types that are not read.
 const FileElement* find_element(std::int64_t type) {
   static const std::map<std::int64_t, FileElement> elements = {
       {1, {ElementType::line2}},
@@ -29,7 +29,7 @@ const FileElement* find_element(std::int64_t type) {
 
 enum SkippedElement : std::int64_t { quadratic_line = 8, point = 15 };
 
-/// What is gathered while the sections go by.
+/// Contents of the sections read so far.
 struct GmshMesh {
   MeshFile mesh;
   std::unordered_map<std::int64_t, Index> node_of_tag;  // node tags have gaps
@@ -51,14 +51,14 @@ Index read_node_by_tag(TextReader& reader, const GmshMesh& gmsh) {
   return found->second;
 }
 
-/// Throws for what is neither read nor something to pass over.
+/// Throws Error for a type that is neither read nor skipped.
 void check_type(const TextReader& reader, std::int64_t type) {
   if (find_element(type) == nullptr && type != quadratic_line && type != point) {
     fail_unknown_element(reader, fmt::format("elements of Gmsh type {}", type));
   }
 }
 
-/// The node list of an element of a type that check_type let through.
+/// Reads the node list of an element of a type that check_type accepts.
 void read_element(TextReader& reader, GmshMesh& gmsh, std::int64_t type, std::span<const Index> physicals) {
   const FileElement* element = find_element(type);
   if (element == nullptr) {
@@ -80,7 +80,7 @@ void read_nodes_2(TextReader& reader, GmshMesh& gmsh, bool parametric) {
   for (std::int64_t i = 0; i < count; ++i) {
     const std::int64_t tag = reader.integer("a node number");
     add_node(reader, gmsh, tag, reader.point());
-    if (parametric) reader.rest_of_line();  // the entity, and where on it
+    if (parametric) reader.rest_of_line();  // its entity, and parameters on it
   }
 }
 
@@ -97,10 +97,10 @@ void read_elements_2(TextReader& reader, GmshMesh& gmsh) {
   }
 }
 
-/// In 2.2 an element stands there once for each group that it is in.
+/// Merges duplicates: format 2.2 lists an element once for each of its groups.
 void unite_groups(FileElements& elements, std::size_t width) {
   if (std::ranges::adjacent_find(elements.tags, std::not_equal_to<>()) == elements.tags.end()) return;
-  std::map<std::vector<Index>, std::size_t> first;  // of those with the same nodes
+  std::map<std::vector<Index>, std::size_t> first;  // by nodes
   FileElements united;
   for (std::size_t e = 0; e < elements.tags.size(); ++e) {
     const std::span<const Index> nodes(elements.nodes.data() + width * e, width);
@@ -116,7 +116,7 @@ void unite_groups(FileElements& elements, std::size_t width) {
   elements = std::move(united);
 }
 
-/// Names of groups: dimension, number and name in quotes.
+/// Reads the names of groups: dimension, number and name in quotes.
 void read_names(TextReader& reader, GmshMesh& gmsh) {
   const std::int64_t count = reader.count("the number of names", 3);
   for (std::int64_t i = 0; i < count; ++i) {
@@ -128,8 +128,7 @@ void read_names(TextReader& reader, GmshMesh& gmsh) {
   }
 }
 
-/// Which physical groups each curve, surface and volume is in; of those that have been cut into partitions,
-/// each part.
+/// Reads the physical groups of each curve, surface and volume; of partitioned ones those of each part.
 void read_entities(TextReader& reader, GmshMesh& gmsh, bool parts) {
   std::array<std::int64_t, 4> counts{};
   if (parts) {
@@ -198,7 +197,7 @@ void read_elements_4(TextReader& reader, GmshMesh& gmsh) {
   if (read != count) reader.fail(fmt::format("the blocks hold {} elements, not {}", read, count));
 }
 
-/// Returns 2 or 4.
+/// Major version of the format, 2 or 4.
 int read_format(TextReader& reader) {
   reader.expect("$MeshFormat");
   const std::string version(reader.word("the format's version"));

@@ -41,7 +41,7 @@ void read_elements(TextReader& reader, const Section& section, MeshFile& mesh) {
   }
 }
 
-/// Corners, ridges, normals, ...: numbers up to the next keyword.
+/// Skips corners, ridges, normals, ...: numbers up to the next keyword.
 void skip_section(TextReader& reader) {
   while (!reader.at_end() && std::isalpha(static_cast<unsigned char>(reader.peek().front())) == 0) {
     reader.word("a number");

@@ -19,7 +19,7 @@ FileElements& of_kind(MeshFile& file, ElementType type) {
   return file.elements[static_cast<std::size_t>(type)];
 }
 
-/// Kinds of this dimension that the file has elements of.
+/// Kinds of this dimension with elements in the file.
 std::vector<ElementType> kinds_of_dimension(const MeshFile& file, int dimension) {
   std::vector<ElementType> kinds;
   for (const ElementTraits& kind : element_traits) {
@@ -29,7 +29,7 @@ std::vector<ElementType> kinds_of_dimension(const MeshFile& file, int dimension)
   return kinds;
 }
 
-/// "12 tet4 and 3 hex8"
+/// Counts of elements: "12 tet4 and 3 hex8".
 std::string counts(const MeshFile& file, const std::vector<ElementType>& kinds) {
   std::vector<std::string> parts;
   parts.reserve(kinds.size());
@@ -73,7 +73,7 @@ void flatten(Mesh& mesh, const TextReader& reader) {
   for (Vec3& x : mesh.nodes) x.z() = 0.0;
 }
 
-/// Facets given by their corners with the middles that the elements have there.
+/// Facets given by their corners, completed by the elements' middle nodes.
 std::vector<Index> find_middles(const Mesh& mesh, const std::vector<Index>& corners,
                                 const TextReader& reader) {
   const std::vector<ElementSide> sides = sorted_sides(mesh);
@@ -97,7 +97,7 @@ std::vector<Index> find_middles(const Mesh& mesh, const std::vector<Index>& corn
   return facets;
 }
 
-/// Those with a tag, once for each.
+/// Keeps tagged facets only, once for each of their tags.
 void drop_untagged(FileElements& facets, ElementType kind) {
   const auto width = static_cast<std::size_t>(traits(kind).nodes);
   FileElements tagged;
@@ -112,7 +112,7 @@ void drop_untagged(FileElements& facets, ElementType kind) {
   facets = std::move(tagged);
 }
 
-/// Takes the tagged elements of one dimension less.
+/// Moves the tagged elements of one dimension less into the mesh.
 void take_facets(MeshFile& file, Mesh& mesh, const TextReader& reader) {
   const ElementType wanted = traits(mesh.element).facet;
   for (const ElementType kind : kinds_of_dimension(file, mesh.dimension() - 1)) {

@@ -22,7 +22,7 @@ std::filesystem::path with_ending(const std::filesystem::path& stem, const char*
 
 namespace {
 
-/// TetGen writes the attribute of a region as a real number.
+/// Reads a region attribute, which TetGen writes as a real number.
 Index read_region(TextReader& reader) {
   const double value = reader.number("a region attribute");
   if (value != std::round(value) || std::abs(value) > std::numeric_limits<Index>::max()) {
@@ -50,7 +50,8 @@ std::int64_t read_nodes(const std::filesystem::path& file, MeshFile& mesh) {
   return first;
 }
 
-/// Faces with a marker. Those of second order list middles too, opposite to the corners; to_body finds them.
+/// Reads faces with a marker. Second-order ones list middles too, opposite to the corners; to_body finds
+/// them.
 void read_faces(const std::filesystem::path& file, std::int64_t first, MeshFile& mesh) {
   constexpr FileElement triangle = {ElementType::tri3};
   TextReader reader(file, '#');
@@ -59,7 +60,7 @@ void read_faces(const std::filesystem::path& file, std::int64_t first, MeshFile&
   for (std::int64_t i = 0; i < count; ++i) {
     reader.integer("a face number");
     read_element(reader, mesh, triangle, first, [&] {
-      // What stands there: three middles or none, the marker, and with TetGen -nn the two elements beside it.
+      // Next on the line: three middles or none, the marker, and with TetGen -nn the two elements beside it.
       if (reader.words_on_line() > 3) reader.skip_words(3, "a node number");
       return reader.tag();
     });
@@ -67,7 +68,7 @@ void read_faces(const std::filesystem::path& file, std::int64_t first, MeshFile&
   }
 }
 
-/// Elements of first order, or of second order with TetGen's middles 23 03 01 12 13 02.
+/// Reads elements of first order, or of second order with TetGen's middles 23 03 01 12 13 02.
 std::pair<Mesh, MeshGroups> read_elements(const std::filesystem::path& file, std::int64_t first,
                                           MeshFile mesh) {
   constexpr FileElement linear = {ElementType::tet4};

@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view space = " \t\r\n\f\v";
 constexpr const char* remake = "The file may be damaged or cut short: write it again";
 
-/// from_chars does not take the leading plus that some programs write.
+/// The word without the leading plus that some programs write and from_chars rejects.
 std::string_view without_plus(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   return word;
@@ -30,7 +30,7 @@ bool parse(std::string_view word, Number& value) {
   return error == std::errc() && end == word.data() + word.size();
 }
 
-/// At most what fits on a line of the terminal; bytes that are no text are shown as '?'.
+/// Start of a word, at most 40 bytes, for a message; bytes that are no text are shown as '?'.
 std::string shown(std::string_view word) {
   std::string result(word.substr(0, 40));
   std::replace_if(
@@ -38,7 +38,7 @@ std::string shown(std::string_view word) {
   return word.size() > 40 ? result + "..." : result;
 }
 
-/// Lines that end with \n alone, without UTF-8's byte order mark.
+/// Text with \n as line ending and without UTF-8's byte order mark.
 std::string plain(std::string text) {
   if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
   std::size_t size = 0;

@@ -10,9 +10,9 @@
 
 namespace palpate {
 
-/// Reads a text file word by word, whatever ends its lines and with or without a byte order mark. Every
-/// function that reads throws Error (where = "file:line") when what is there is not what was asked for;
-/// `what` says in the message what that was, e.g. "a node number".
+/// Reader of a text file word by word, for any line ending, with or without a byte order mark. Every reading
+/// function throws Error (where = "file:line") if the next text is not what was asked for; `what` names that
+/// in the message, e.g. "a node number".
 class TextReader {
  public:
   /// Text from `comment` to the end of its line is skipped ('\0': there are no comments).
@@ -21,16 +21,16 @@ class TextReader {
   /// Reads `text`, which is in `file`.
   TextReader(std::filesystem::path file, std::string text, char comment);
 
-  /// No word is left.
+  /// True if no word is left.
   [[nodiscard]] bool at_end();
-  /// The next word, which stays next; empty at the end.
+  /// The next word, without reading past it; empty at the end.
   [[nodiscard]] std::string_view peek();
   std::string_view word(const char* what);
   void expect(std::string_view word);
   std::int64_t integer(const char* what);
   /// A whole number in [low, high].
   std::int64_t integer(const char* what, std::int64_t low, std::int64_t high);
-  /// A number of things, each of which takes at least `words` words of what is left of the file.
+  /// A number of items, each of which takes at least `words` of the words left in the file.
   std::int64_t count(const char* what, std::int64_t words);
   /// A region or boundary tag.
   Index tag();
@@ -42,23 +42,23 @@ class TextReader {
   /// Skips letters of the next word, which then begins behind them.
   void skip_letters(std::size_t count);
 
-  /// A word is left on the line, which a backslash at its end continues.
+  /// True if a word is left on the line; a backslash at its end continues a line.
   [[nodiscard]] bool on_line();
 
-  /// How many words are left on the line; they stay next.
+  /// Number of words left on the line, without reading past them.
   [[nodiscard]] std::int64_t words_on_line() const;
-  /// What is left of the line, without its end.
+  /// Rest of the line, without its end.
   std::string_view rest_of_line();
 
   /// Throws Error about the word read last.
   [[noreturn]] void fail(const std::string& what, const std::string& hint) const;
   [[noreturn]] void fail(const std::string& what) const;
-  /// Throws Error: `found` stands where `what` should be.
+  /// Throws Error: `found` is not the expected `what`.
   [[noreturn]] void fail_on(std::string_view found, const char* what) const;
 
  private:
   void skip_space();
-  /// A backslash stands there, at the end of a line.
+  /// True if a backslash at the end of a line is at position i.
   [[nodiscard]] bool continues(std::size_t i) const;
 
   std::filesystem::path file_;

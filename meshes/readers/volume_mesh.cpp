@@ -19,7 +19,7 @@ std::string extension_of(const std::filesystem::path& file) {
   return extension;
 }
 
-/// What .node and .ele have in common; nothing for other files.
+/// Common stem of .node and .ele; empty for other files.
 std::filesystem::path tetgen_stem(const std::filesystem::path& file) {
   const std::string extension = extension_of(file);
   if (extension == ".node" || extension == ".ele") return std::filesystem::path(file).replace_extension();

@@ -1,4 +1,4 @@
-// One reader a mesh file format; read_volume_mesh chooses.
+// Readers of one mesh file format each; read_volume_mesh chooses.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,8 @@
 
 namespace palpate {
 
-/// Each throws Error with file and line. Facets and elements without a tag, or with tag 0, count as untagged.
+/// Reads a mesh. Throws Error with file and line. Facets and elements without a tag, or with tag 0, count as
+/// untagged.
 std::pair<Mesh, MeshGroups> read_gmsh(const std::filesystem::path& file);   ///< .msh, 2.2 and 4.1 ASCII
 std::pair<Mesh, MeshGroups> read_medit(const std::filesystem::path& file);  ///< .mesh, ASCII
 std::pair<Mesh, MeshGroups> read_tetgen(
@@ -15,8 +16,8 @@ std::pair<Mesh, MeshGroups> read_tetgen(
 std::pair<Mesh, MeshGroups> read_vtk_legacy(
     const std::filesystem::path& file);  ///< .vtk, ASCII unstructured grid
 
-/// A set of files is named by what their names have in common: "liver" for liver.node and liver.ele.
-/// The ending is in capitals where only a file of that name is there.
+/// A file of a set named by a common stem, "liver" for liver.node and liver.ele. The ending is in capitals if
+/// only a file of that name exists.
 std::filesystem::path with_ending(const std::filesystem::path& stem, const char* ending);
 
 /// Adds an element whose node numbers, counted from `first`, come next in the file; `read_tag` reads its tag.

@@ -18,14 +18,14 @@ namespace {
 
 enum SkippedCell : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, quadratic_edge = 21 };
 
-/// Node lists of all cells, whatever their type.
+/// Node lists of all cells, of any type.
 struct Cells {
   std::vector<Index> nodes;
   std::vector<std::size_t> offsets = {0};  // [cells + 1] into nodes
   std::vector<Index*> tags;                // [cells] of the elements that they have become; null: none
 };
 
-/// A value of each cell.
+/// One value per cell.
 struct CellArray {
   std::string name;
   std::vector<Index> values;
@@ -85,14 +85,14 @@ Cells read_cells(TextReader& reader, std::size_t points) {
   return read_counted_lists(reader, count, points);
 }
 
-/// The kind of element that a cell is, if any.
+/// Kind of element of a cell type; null if there is none.
 const ElementTraits* find_cell_type(std::int64_t type) {
   const auto* const found = std::find_if(element_traits.begin(), element_traits.end(),
                                          [&](const ElementTraits& t) { return t.vtk == type; });
   return found == element_traits.end() ? nullptr : found;
 }
 
-/// How many nodes a cell of this type has; 0 where that differs. Throws for what is not read.
+/// Number of nodes of a cell type; 0 if it varies. Throws Error for types that are not read.
 std::size_t node_count(const TextReader& reader, std::int64_t type) {
   if (const ElementTraits* element = find_cell_type(type)) return static_cast<std::size_t>(element->nodes);
   switch (type) {
@@ -108,8 +108,8 @@ std::size_t node_count(const TextReader& reader, std::int64_t type) {
   }
 }
 
-/// Takes the elements among the cells while reading their types. The sizes are compared for all of them, so
-/// that a type cut short (1 of 10) at the end of the file is noticed.
+/// Extracts the elements while reading the cells' types. Sizes are compared for all cells, so that a type cut
+/// short (1 of 10) at the end of the file is noticed.
 void read_types(TextReader& reader, Cells& cells, MeshFile& mesh) {
   const std::int64_t count = reader.count("the number of cell types", 1);
   if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
@@ -136,7 +136,7 @@ void read_types(TextReader& reader, Cells& cells, MeshFile& mesh) {
   }
 }
 
-/// METADATA ends with an empty line.
+/// Skips METADATA, which ends with an empty line.
 void skip_metadata(TextReader& reader) {
   reader.rest_of_line();
   while (!reader.rest_of_line().empty()) {
@@ -155,7 +155,7 @@ bool is_whole(const std::string& type) {
   return types.contains(in_small_letters(type));
 }
 
-/// Whether other programs call the array of regions so.
+/// True if other programs give this name to the array of regions.
 bool is_of_regions(const std::string& name) {
   static const std::set<std::string> names = {
       "region",    "regions",       "regionid",      "region_id",   "material",
@@ -166,7 +166,7 @@ bool is_of_regions(const std::string& name) {
   return names.contains(in_small_letters(name));
 }
 
-/// Reads an array of one whole number a tuple, where `arrays` wants it; passes over others.
+/// Reads an array of one whole number per tuple into `arrays`; skips others.
 void read_values(TextReader& reader, const std::string& name, const std::string& type,
                  std::int64_t components, std::int64_t tuples, std::vector<CellArray>* arrays) {
   if (arrays == nullptr || components != 1 || (!is_whole(type) && !is_of_regions(name))) {
@@ -183,7 +183,7 @@ void read_values(TextReader& reader, const std::string& name, const std::string&
   if (std::ssize(array.values) == tuples) arrays->push_back(std::move(array));
 }
 
-/// Arrays of the whole file (time, cycle), of points or cells.
+/// Reads arrays of the whole file (time, cycle), of points or of cells.
 void read_field(TextReader& reader, std::vector<CellArray>* arrays) {
   reader.word("the field's name");
   const std::int64_t count = reader.count("the number of arrays", 1);
@@ -197,7 +197,7 @@ void read_field(TextReader& reader, std::vector<CellArray>* arrays) {
   }
 }
 
-/// An attribute of `tuples` points or cells; false for one that is not known, after which nothing is read.
+/// Reads an attribute of `tuples` points or cells; false, after its name, for an unknown one.
 bool read_attribute(TextReader& reader, const std::string& keyword, std::int64_t tuples,
                     std::vector<CellArray>* arrays) {
   static const std::map<std::string, std::int64_t> components = {{"VECTORS", 3},    {"NORMALS", 3},
@@ -229,7 +229,7 @@ bool read_attribute(TextReader& reader, const std::string& keyword, std::int64_t
   return true;
 }
 
-/// The array that says the regions: of the names that other programs write, else the only one.
+/// Sets the regions by the array with a name that other programs use, else by the only array.
 void take_regions(std::vector<CellArray> arrays, const Cells& cells, MeshFile& mesh) {
   std::erase_if(arrays, [&](const CellArray& array) { return array.values.size() != cells.tags.size(); });
   if (arrays.empty()) return;

@@ -10,19 +10,19 @@
 
 namespace palpate {
 
-/// Named nodal values: `values` holds `components` numbers a node.
+/// Named nodal values: `values` holds `components` numbers per node.
 struct NodalField {
   std::string name;
   int components;
   std::span<const double> values;
 };
 
-/// Elements of one kind (`connectivity`: [E * nodes an element] node numbers) with nodal fields as the bytes
-/// of a .vtu file: XML with raw little-endian numbers appended.
+/// Bytes of a .vtu file with elements of one kind (`connectivity`: [E * nodes per element] node numbers) and
+/// nodal fields: XML with raw little-endian numbers appended.
 [[nodiscard]] std::string vtu_text(std::span<const Vec3> nodes, ElementType element,
                                    std::span<const Index> connectivity, std::span<const NodalField> fields);
 
-/// Writes the same to a file by `write_file`. Throws Error when it cannot be written.
+/// Writes `vtu_text` to a file by `write_file`. Throws Error if it cannot be written.
 void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
                std::span<const Index> connectivity, std::span<const NodalField> fields);
 
