@@ -1,4 +1,4 @@
-// What an interrupted run had computed before the columns of its model.
+// Results that an interrupted run computed before the columns of its model.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ struct BegunModel {
   bool is_packed = false;  ///< its Green's functions are not compressed
 };
 
-/// Reads PATH.partial, which a run has begun; nothing where there is none, or it is damaged.
+/// Reads PATH.partial of an interrupted run; nullopt if there is none or it is damaged.
 std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial);
 
 }  // namespace palpate

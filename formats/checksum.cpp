@@ -35,11 +35,11 @@ XXH128_canonical_t canonical(XXH128_hash_t hash) {
   return digest;
 }
 
-/// Bytes [first, first + size) of an array, as they are or read from a file.
+/// Provides bytes [first, first + size) of an array, in place or read from a file into `buffer`.
 using Take = std::function<std::span<const std::byte>(std::size_t first, std::size_t size,
                                                       std::span<std::byte> buffer)>;
 
-/// Hash of bytes [first, first + size), which `inspect` sees block by block.
+/// Hash of bytes [first, first + size); `inspect` gets them block by block.
 XXH128_hash_t hash_of_chunk(std::size_t first, std::size_t size, const Take& take,
                             const ChunkedChecksum::Inspect& inspect) {
   alignas(64) XXH3_state_t state;
@@ -53,7 +53,7 @@ XXH128_hash_t hash_of_chunk(std::size_t first, std::size_t size, const Take& tak
   return XXH3_128bits_digest(&state);
 }
 
-/// Digests of the chunks of bytes [first, first + size), by all processors.
+/// Digests of the chunks of bytes [first, first + size), computed on all processors.
 std::vector<std::byte> digests_of(std::size_t first, std::size_t size, const Take& take,
                                   const ChunkedChecksum::Inspect& inspect) {
   constexpr std::size_t chunk = ChunkedChecksum::chunk;

@@ -1,5 +1,4 @@
-// XXH3-128 checksums: at memory speed, so that every load can afford the check. They find accidents, not
-// attackers.
+// XXH3-128 checksums, fast enough to check every load. They detect accidents, not attackers.
 #pragma once
 
 #include <cstddef>
@@ -16,13 +15,13 @@ namespace palpate {
 
 class FileDescriptor;
 
-/// 32 hexadecimal digits.
+/// Checksum of bytes, 32 hexadecimal digits.
 std::string checksum(std::span<const std::byte> bytes);
 
-/// XXH3-128 of a text's bytes, 32 hexadecimal digits.
+/// Checksum of a text's bytes, 32 hexadecimal digits.
 std::string checksum(std::string_view text);
 
-/// Checksum of a file's bytes (what `xxhsum -H2` prints); throws Error when it cannot be read.
+/// Checksum of a file's bytes (as printed by `xxhsum -H2`); throws Error if it cannot be read.
 std::string checksum_file(const std::filesystem::path& file);
 
 /// Checksum of bytes that arrive in pieces.
@@ -39,24 +38,25 @@ class RunningChecksum {
   std::unique_ptr<State> state_;
 };
 
-/// Checksum of a large array, computed by all processors. Up to `chunk` bytes it is `checksum`; beyond that
-/// the `checksum` of the 16-byte big-endian digests of the chunks, one after the other.
+/// Checksum of a large array, computed on all processors. Up to `chunk` bytes it equals `checksum`; beyond
+/// that it is the `checksum` of the chunks' 16-byte big-endian digests, one after the other.
 class ChunkedChecksum {
  public:
   static constexpr std::size_t chunk = std::size_t{16} << 20;  ///< [byte]
 
-  /// Looks at a block while it is in the cache; called by several threads at once. Where what was appended
-  /// before is a multiple of 64 KiB, so are the places where blocks start.
+  /// Reads a block while it is in the cache; called by several threads at once. Blocks start at multiples of
+  /// 64 KiB if the size appended before is one.
   using Inspect = std::function<void(std::size_t first_byte, std::span<const std::byte> block)>;
 
   ChunkedChecksum();
   ~ChunkedChecksum();
 
-  /// Pieces of any size; what is a multiple of `chunk` at a multiple of `chunk` is shared among processors.
+  /// Appends a piece of any size. Whole chunks that begin at a multiple of `chunk` are distributed over the
+  /// processors.
   void append(std::span<const std::byte> bytes, const Inspect& inspect = {});
 
-  /// Reads `bytes` bytes of a file at `offset` and appends them. They are left at `into`, which may be null.
-  /// Comes first, or after multiples of `chunk`. Throws Error when they cannot be read.
+  /// Reads `bytes` bytes of a file at `offset` and appends them; stores them at `into` unless it is null.
+  /// Call it first, or after multiples of `chunk`. Throws Error if they cannot be read.
   void append_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes, std::byte* into,
                    const Inspect& inspect = {});
 

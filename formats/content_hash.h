@@ -1,4 +1,4 @@
-// The hash of a whole file: over the checksums of its datasets and the values of its root attributes.
+// Hash of a whole file, from the checksums of its datasets and the values of its root attributes.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class ContentHash {
   std::vector<std::string> lines_;
 };
 
-/// Adds the format, its version, and every root attribute of the table.
+/// Adds the format, its version and all root attributes of the table.
 void add_attributes(ContentHash& content, const Model& model, const FileHeader& header,
                     std::span<const std::int64_t> version);
 

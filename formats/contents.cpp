@@ -20,7 +20,7 @@ constexpr const char* copy_again = "Copy the file again, or precompute it again"
 constexpr const char* give_ours = "Give a NAME.palpate.hdf that palpate-precompute has written";
 constexpr std::uint64_t index_version = 1;
 constexpr std::size_t checksum_digits = 32;
-// Magic, version, length, checksum; what follows is what the checksum is of.
+// Magic, version, length and checksum; the checksum covers all that follows.
 constexpr std::size_t head_bytes = 8 + 8 + 8 + checksum_digits;
 
 // ---- the index's bytes ----
@@ -61,7 +61,7 @@ void put(std::vector<std::byte>& bytes, const FileObject& object) {
   }
 }
 
-/// Takes numbers and texts from the front of bytes that may say anything.
+/// Reader of numbers and texts from the front of untrusted bytes.
 class IndexBytes {
  public:
   IndexBytes(std::span<const std::byte> bytes, const std::string& where) : rest_(bytes), where_(where) {}
@@ -87,7 +87,7 @@ class IndexBytes {
     if (count > 0) std::memcpy(values.data(), take(count * sizeof(T)).data(), count * sizeof(T));
     return values;
   }
-  /// Names, or paths, that ascend, each with what `value` takes.
+  /// Reads a map of ascending names or paths, whose values `value` reads.
   template <class Value>
   auto by_name(Value&& value) {
     std::map<std::string, decltype(value())> values;
@@ -132,7 +132,7 @@ class IndexBytes {
   const std::string& where_;
 };
 
-/// As far as both go.
+/// True if `bytes` begin with `magic`, as far as both go.
 bool begins_with(std::span<const std::byte> bytes, std::string_view magic) {
   return std::memcmp(bytes.data(), magic.data(), std::min(bytes.size(), magic.size())) == 0;
 }
@@ -143,7 +143,7 @@ bool begins_with(std::span<const std::byte> bytes, std::string_view magic) {
       where, copy_again);
 }
 
-/// What the checksum is of, once it and what stands before are as they should be.
+/// The bytes under the checksum, after checking it and everything before it.
 std::span<const std::byte> checked(std::span<const std::byte> index, const std::string& where) {
   if (index.empty()) throw Error("the file is empty", where, copy_again);
   if (begins_with(index, hdf5_magic) && !begins_with(index, index_magic))
@@ -165,7 +165,7 @@ std::span<const std::byte> checked(std::span<const std::byte> index, const std::
   return content;
 }
 
-// ---- what the index says ----
+// ---- contents of the index ----
 
 std::string text_of(std::span<const std::uint64_t> dims) {
   std::string text;
@@ -173,7 +173,7 @@ std::string text_of(std::span<const std::uint64_t> dims) {
   return text.empty() ? "a scalar" : text;
 }
 
-/// Bytes of an array; nothing where they are beyond all numbers.
+/// Size of an array [byte]; nullopt if it overflows.
 std::optional<std::uint64_t> bytes_of(const NumberType& type, std::span<const std::uint64_t> dims) {
   auto bytes = static_cast<std::int64_t>(type.bytes);
   for (const std::uint64_t dim : dims)
@@ -183,7 +183,7 @@ std::optional<std::uint64_t> bytes_of(const NumberType& type, std::span<const st
   return static_cast<std::uint64_t>(bytes);
 }
 
-/// Proves that an object's bytes fit its type and dimensions, and lie in the file behind the index.
+/// Checks that an object's bytes fit its type and dimensions, and lie in the file behind the index.
 void check_object(const std::string& path, const FileObject& object, std::uint64_t file_bytes,
                   const IndexBytes& index, const std::string& where) {
   const auto type = std::ranges::find(number_types, object.type, &NumberType::name);
@@ -209,7 +209,7 @@ void check_object(const std::string& path, const FileObject& object, std::uint64
     throw Error(path + " lies on the file's index", where, copy_again);
 }
 
-/// Proves that no two objects share bytes.
+/// Checks that no two objects share bytes.
 void check_places(const FileObjects& objects, const std::string& where) {
   std::vector<const FileObjects::value_type*> placed;
   for (const auto& object : objects)

@@ -1,5 +1,5 @@
-// Files of ours begin with an index of what their HDF5 holds and where it lies (docs/file-format.md), so that
-// no HDF5 library is needed to read them.
+// Index at the beginning of our files: the objects of their HDF5 part and their places (docs/file-format.md),
+// so that reading needs no HDF5 library.
 #pragma once
 
 #include <array>
@@ -18,13 +18,13 @@
 
 namespace palpate {
 
-/// Bytes at the beginning of a file that are the index's. HDF5 calls them the user block, and skips them.
+/// Size of the index [byte]. HDF5 calls this space the user block and skips it.
 inline constexpr std::int64_t index_bytes = 32768;
 
-/// The first bytes of an index.
+/// First bytes of an index.
 inline constexpr std::string_view index_magic = "\x89PLP\r\n\x1a\n";
 
-/// A type of numbers as they lie in a file (little-endian).
+/// A type of numbers as stored in a file (little-endian).
 struct NumberType {
   std::string_view name;  ///< "float64"
   std::size_t bytes;      ///< of one number
@@ -33,10 +33,10 @@ struct NumberType {
 inline constexpr std::array<NumberType, 6> number_types = {
     {{"uint8", 1}, {"uint32", 4}, {"int32", 4}, {"int64", 8}, {"float32", 4}, {"float64", 8}}};
 
-/// Object::type of datasets of anything else.
+/// Object::type of datasets of any other type.
 inline constexpr std::string_view other_type = "another type";
 
-/// For std::uint8_t, std::uint32_t, std::int32_t, std::int64_t, float and double.
+/// NumberType of std::uint8_t, std::uint32_t, std::int32_t, std::int64_t, float or double.
 template <class T>
 constexpr NumberType number_type();
 template <>
@@ -64,57 +64,57 @@ constexpr NumberType number_type<double>() {
   return number_types[5];
 }
 
-/// A text, or integers.
+/// Value of an attribute: a text, or integers.
 using FileAttribute = std::variant<std::string, std::vector<std::int64_t>>;
 
 /// A dataset or group.
 struct FileObject {
   std::string type{};                 ///< NumberType::name or other_type; empty: a group
-  std::vector<std::uint64_t> dims{};  ///< of a dataset
-  std::uint64_t offset = 0;           ///< of its first byte in the file
-  std::uint64_t bytes = 0;            ///< 0 also of a dataset that does not lie in one piece
+  std::vector<std::uint64_t> dims{};  ///< dimensions of a dataset
+  std::uint64_t offset = 0;           ///< position of its first byte in the file
+  std::uint64_t bytes = 0;            ///< 0 also for a dataset that is not contiguous
   std::map<std::string, FileAttribute> attributes{};
 };
 
 using FileObjects = std::map<std::string, FileObject>;  ///< by path
 
-/// The index of a file of `file_bytes` bytes as it lies there: `index_bytes` bytes. Throws Error (`where`)
-/// when that is too little.
+/// Encodes the index of a file of `file_bytes` bytes, `index_bytes` bytes long. Throws Error (`where`) if it
+/// does not fit.
 std::vector<std::byte> make_index(const FileObjects& objects, std::uint64_t file_bytes,
                                   const std::string& where);
 
-/// A dataset that lies in one piece.
+/// A contiguous dataset.
 struct Stored {
   std::vector<std::int64_t> dims;
-  std::int64_t offset = 0;  ///< of its first byte
+  std::int64_t offset = 0;  ///< position of its first byte
   std::int64_t bytes = 0;
 };
 
-/// Groups, datasets and attributes of a file, by its index, of which nothing is believed that is not proved:
-/// its checksum, that sizes fit types and dimensions, and that datasets lie inside the file and not on each
-/// other. All throw Error (where = the file; fields are named).
+/// Groups, datasets and attributes of a file, from its index. The index is not trusted: its checksum is
+/// verified, sizes must fit types and dimensions, and datasets must lie inside the file without overlap. All
+/// members throw Error (where = the file; fields are named).
 class Contents {
  public:
-  /// Those of an open file, which stays open as long as this lives. Throws Error where it is none of ours,
-  /// cut off, or its index is damaged.
+  /// Reads the index of an open file, which stays open while this lives. Throws Error if the file is not one
+  /// of ours, is cut off, or has a damaged index.
   static Contents read(FileDescriptor file);
   static Contents read(const std::filesystem::path& path) { return read(open_file(path, OpenMode::read)); }
-  /// Those that the file has by another index than its own.
+  /// Contents of a file by an index other than its own.
   static Contents of(FileDescriptor file, std::span<const std::byte> index);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
   [[nodiscard]] const FileDescriptor& file() const noexcept { return file_; }
 
-  /// A dataset or group of the file itself, not behind a link.
+  /// True for a dataset or group of the file itself, not behind a link.
   [[nodiscard]] bool has(const std::string& object) const { return objects_.contains(object); }
 
-  /// Finds a dataset and proves that it has this type and rank, and lies in one piece.
+  /// Finds a dataset and checks that it has this type and rank and is contiguous.
   [[nodiscard]] Stored locate(const std::string& dataset, const NumberType& type, std::size_t rank) const;
 
-  /// Value of a text attribute; nothing where it is missing or of another kind.
+  /// Value of a text attribute; nullopt if it is missing or of another kind.
   [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object,
                                                           const std::string& name) const;
-  /// `count` values of an integer attribute; nothing where it is missing or of another kind.
+  /// `count` values of an integer attribute; nullopt if it is missing or of another kind.
   [[nodiscard]] std::optional<std::vector<std::int64_t>> integer_attribute(const std::string& object,
                                                                            const std::string& name,
                                                                            std::size_t count) const;

@@ -32,7 +32,7 @@ void check_newmark(const StoredDynamics& dynamics, const std::string& where) {
     refuse(where, "/dynamics/damping is negative");
 }
 
-/// Column `j` of M and C_d.
+/// Checks column `j` of M and C_d.
 void check_column(const Model& model, std::int64_t j, const std::string& where) {
   const MassAndDamping& matrices = model.dynamics.matrices;
   const std::string column = ": column " + std::to_string(j);

@@ -1,4 +1,4 @@
-// The part of the file's table that is about dynamics.
+// Dynamics in the table of file fields.
 #pragma once
 
 #include "formats/model_fields.h"
@@ -12,8 +12,9 @@ std::vector<double> newmark_of(const Model& model);
 void put_newmark(Model& model, const std::vector<double>& values);
 void put_method(Model& model, const std::vector<std::int32_t>& values);
 
-/// Datasets of files that hold dynamics but the packed inverse, which is mapped; others do not have the
-/// group. The method comes before what it decides: the model may be the one that the visitor fills.
+/// Datasets of files with dynamics, except the packed inverse, which is mapped; other files do not have the
+/// group. The method comes before the fields that depend on it: `model` may be the one that the visitor
+/// fills.
 template <class Visitor>
 void for_each_dynamics_field(const Model& model, Visitor&& visit) {
   using Octets = std::vector<std::uint8_t>;
@@ -75,9 +76,9 @@ void for_each_dynamics_field(const Model& model, Visitor&& visit) {
   }
 }
 
-/// Proves that Newmark's method is stable, damping not negative, and M, C_d or the modes in order: columns of
-/// the lower triangle of all free dofs, frequencies that ascend, nothing at held dofs. Sizes are right and
-/// values in their ranges already. Throws Error (where = `where`) naming the field.
+/// Checks that Newmark's method is stable, that damping is not negative, and that M and C_d or the modes are
+/// in order: columns of the lower triangle of all free dofs, ascending frequencies, zeros at held dofs.
+/// Assumes sizes and value ranges are checked. Throws Error (where = `where`) naming the field.
 void check_dynamics(const Model& model, const std::string& where);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// The sizes that fields of a file share, and what one field must hold.
+// Sizes common to several fields of a file, and the checks of one field's values.
 #pragma once
 
 #include <array>
@@ -11,27 +11,27 @@
 
 namespace palpate {
 
-/// Says what is wrong with the file `where`. Throws Error.
+/// Throws Error: `what` is wrong with the file `where`.
 [[noreturn]] void refuse(const std::string& where, const std::string& what);
 
-/// The counts that a file's fields share, and which field told them.
+/// Counts that a file's fields have in common, each with the field that set it.
 class Counts {
  public:
   explicit Counts(std::string where);
 
   void set(Count count, std::int64_t value, const char* told_by);
 
-  /// A model of scope none stores no node.
+  /// Allows a model of scope none, which stores no node.
   void allow_none_stored() noexcept { least_stored_ = 0; }
 
-  /// The size that a dimension must have.
+  /// Required size of a dimension.
   [[nodiscard]] std::int64_t size(const Extent& extent) const;
 
-  /// All sizes of a field.
+  /// Required sizes of a field.
   [[nodiscard]] std::vector<std::int64_t> sizes(const std::vector<Extent>& shape) const;
 
-  /// Takes a field's sizes: the first field that has a count sets it, the others must agree. Throws Error
-  /// (both fields and sizes).
+  /// Checks a field's sizes: the first field with a count sets it, the others must agree. Throws Error (both
+  /// fields and sizes).
   void match(const char* path, const std::vector<Extent>& shape, const std::vector<std::int64_t>& dims);
 
   [[nodiscard]] const std::string& where() const noexcept { return where_; }
@@ -43,8 +43,8 @@ class Counts {
   std::array<const char*, number_of_counts> told_by_ = {};
 };
 
-/// Proves that a field has as many values as its shape asks for, and that each is finite and in its range.
-/// Throws Error.
+/// Checks that a field has the number of values of its shape, and that each is finite and in range. Throws
+/// Error.
 template <class T>
 void check_values(const Field<T>& field, const std::vector<T>& values, const Counts& counts) {
   std::int64_t expected = 1;

@@ -14,7 +14,7 @@
 namespace palpate {
 namespace {
 
-// With what other formats become one that is read. Each is a line for a shell.
+// Commands that convert other formats into one that is read. Each is a line for a shell.
 constexpr std::string_view meshio = "convert it: meshio convert --ascii FILE NAME.vtk";
 constexpr std::string_view assimp = "convert it: assimp export FILE NAME.stl";
 constexpr std::string_view gmsh = "convert it: gmsh -2 FILE -o NAME.stl";
@@ -104,7 +104,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// The longest of the kind's endings that a name in small letters has; empty for none.
+/// Longest of the kind's endings that a name in small letters has; empty if none.
 std::string_view ending_of(const FileKind& kind, const std::string& name) {
   std::string_view longest, rest = kind.endings;
   while (!rest.empty()) {
@@ -129,7 +129,7 @@ Named named(const std::filesystem::path& file) {
   return found;
 }
 
-/// What files of the kind with this ending have at a place.
+/// Bytes at a fixed place in files of the kind with this ending.
 struct Magic {
   std::string_view ending;
   std::size_t at;
@@ -173,7 +173,7 @@ constexpr std::array magics = {
     Magic{".off", 0, "OFF "},
 };
 
-/// Words of text files, somewhere in what they begin with.
+/// Words somewhere in the first bytes of text files.
 constexpr std::array marks_in_text = {Magic{".vtu", 0, "type=\"UnstructuredGrid\""},
                                       Magic{".vtu", 0, "type=\"PUnstructuredGrid\""},
                                       Magic{".vtp", 0, "type=\"PolyData\""},
@@ -191,7 +191,8 @@ bool begins_with_word(std::string_view text, std::string_view first) {
          std::isspace(static_cast<unsigned char>(text[first.size()])) != 0;
 }
 
-/// STL has no magic number: text that begins so, or the bytes that its number of triangles asks for.
+/// True for STL, which has no magic number: a text that begins like one, or the size that its number of
+/// triangles implies.
 bool is_stl(std::string_view head, std::uintmax_t bytes) {
   if (head.starts_with("solid") && head.find("facet") != std::string_view::npos) return true;
   if (head.size() < 84) return false;
@@ -266,7 +267,7 @@ void check_is_read(const std::filesystem::path& file, std::string_view geometry)
   if (!std::filesystem::is_regular_file(file, problem)) return;
   const auto [by_name, ending] = named(file);
   const FileKind* const by_content = kind_by_content(file);
-  // A container says little of what is in it.
+  // A container alone does not determine its contents.
   const bool is_container =
       by_content == kind_by_name(".h5") && by_name != nullptr && by_name->geometry.empty();
   const FileKind* const kind = by_content != nullptr && !is_container ? by_content : by_name;

@@ -23,7 +23,8 @@ void refuse_negative(const std::vector<double>& values) {
     throw Unreadable{"holds a number that is negative or not finite"};
 }
 
-/// Clusters in [first, end), the row on the column's level and not before it, each pair once.
+/// Checks that pairs are of clusters in [first, end), with the row on the column's level and not before it,
+/// each pair once.
 void check_pairs(const std::vector<Pair>& pairs, Index first, Index end, bool with_itself,
                  const std::string& path, const std::string& where) {
   for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -37,7 +38,7 @@ void check_pairs(const std::vector<Pair>& pairs, Index first, Index end, bool wi
   }
 }
 
-/// Goes down the pairs of clusters as the file has them, and counts those that it meets.
+/// Walk down the file's pairs of clusters that counts the pairs it meets.
 struct Cover {
   const HierarchicalMatrix& matrix;
   std::size_t far = 0, near = 0;
@@ -45,7 +46,7 @@ struct Cover {
   [[nodiscard]] static bool has(const std::vector<Pair>& pairs, const Pair& pair) {
     return std::binary_search(pairs.begin(), pairs.end(), pair, by_column);
   }
-  /// a >= b. False where the entries of some pair of leaves are nowhere.
+  /// Visits a pair a >= b; false if the entries of some pair of leaves are missing.
   bool visit(Index a, Index b) {
     if (a != b && has(matrix.far_pair, {a, b})) {
       ++far;

@@ -1,4 +1,4 @@
-// The part of the file's table that is about Green's functions in nested low-rank form.
+// Green's functions in nested low-rank form in the table of file fields.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Where it is, the Green's functions are compressed.
+/// Dataset whose presence means that the Green's functions are compressed.
 inline constexpr const char* tree_path = "/greens/levels";
 inline constexpr const char* near_path = "/greens/near";
 
@@ -22,7 +22,7 @@ void put_ranks(Model& model, const std::vector<std::int32_t>& values);
 void put_pair_errors(Model& model, const std::vector<double>& values);
 void put_certificate(Model& model, const std::vector<double>& values);
 
-/// What is known before the entries.
+/// Fields known before the matrix entries.
 template <class Visitor>
 void for_each_tree_field(Visitor&& visit) {
   using Int32s = std::vector<std::int32_t>;
@@ -45,7 +45,7 @@ void for_each_tree_field(Visitor&& visit) {
                             put_far_pairs});
 }
 
-/// What is known once the matrix is made, beside its arrays.
+/// Fields known once the matrix is computed, besides its arrays.
 template <class Visitor>
 void for_each_rank_field(Visitor&& visit) {
   visit(Field<std::int32_t>{"/greens/ranks",
@@ -66,11 +66,11 @@ void for_each_rank_field(Visitor&& visit) {
                       put_certificate});
 }
 
-/// One of the arrays of float, which are mapped and not copied.
+/// A float array of the matrix, which is mapped and not copied.
 struct CompressedArray {
   const char* path;
   std::shared_ptr<const float[]> HierarchicalMatrix::*data;
-  std::vector<std::int64_t> HierarchicalMatrix::*at;  ///< its last entry is the array's size
+  std::vector<std::int64_t> HierarchicalMatrix::*at;  ///< offsets; the last is the array's size
 };
 inline constexpr std::array<CompressedArray, 4> compressed_arrays = {{
     {near_path, &HierarchicalMatrix::near, &HierarchicalMatrix::near_at},
@@ -79,16 +79,16 @@ inline constexpr std::array<CompressedArray, 4> compressed_arrays = {{
     {"/greens/couplings", &HierarchicalMatrix::coupling, &HierarchicalMatrix::coupling_at},
 }};
 
-/// The matrix that a model is being given.
+/// Compressed matrix of a model that is being read.
 HierarchicalMatrix& compressed_to_fill(Model& model);
 
 void count_tree(const HierarchicalMatrix& matrix, Counts& counts);
 
-/// Proves that levels and pairs belong to the stored nodes: each pair of leaves is near, or is in one far
+/// Checks that levels and pairs belong to the stored nodes: each pair of leaves is near, or is in one far
 /// pair of clusters above them. Throws Error (where = `where`) naming the field.
 void check_tree(const Model& model, const std::string& where);
 
-/// Proves that there is a rank for each cluster. Throws Error.
+/// Checks that there is a rank for each cluster. Throws Error.
 void check_ranks(const Model& model, const std::string& where);
 
 }  // namespace palpate

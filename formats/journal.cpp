@@ -16,7 +16,7 @@ namespace {
 constexpr std::string_view first_word = "palpate-progress ";
 constexpr std::string_view first_line = "palpate-progress 2";
 
-/// The words of a line.
+/// Words of a line.
 std::vector<std::string_view> words(std::string_view line) {
   std::vector<std::string_view> result;
   while (!line.empty()) {
@@ -27,7 +27,7 @@ std::vector<std::string_view> words(std::string_view line) {
   return result;
 }
 
-/// Bytes, columns and rows are fewer than this, so that no sum of a journal's numbers overflows.
+/// Upper limit of bytes, columns and rows, so that no sum of a journal's numbers overflows.
 constexpr std::int64_t beyond_all = std::int64_t{1} << 48;
 
 bool to_number(std::string_view text, std::int64_t& value) {
@@ -35,7 +35,7 @@ bool to_number(std::string_view text, std::int64_t& value) {
   return error == std::errc() && end == text.data() + text.size() && value >= 0 && value < beyond_all;
 }
 
-/// Complete lines only: what follows the last line end was cut off.
+/// Complete lines; text after the last line end was cut off.
 std::vector<std::string_view> lines(std::string_view text) {
   std::vector<std::string_view> result;
   for (std::size_t end = text.find('\n'); end != std::string_view::npos; end = text.find('\n')) {
@@ -76,7 +76,7 @@ std::optional<BakePart> read_part(std::string_view line) {
   return part;
 }
 
-/// False when the file was deleted or replaced between opening and locking it.
+/// True unless the file was deleted or replaced between opening and locking it.
 bool is_still_there(const FileDescriptor& file) {
   struct stat opened = {};
   struct stat named = {};
@@ -84,7 +84,7 @@ bool is_still_there(const FileDescriptor& file) {
          opened.st_ino == named.st_ino;
 }
 
-/// Whether a regular file stands there. Throws Error where something else does.
+/// True if a regular file exists there. Throws Error if it is something else.
 bool is_there(const std::filesystem::path& file) {
   struct stat status = {};
   if (::lstat(file.c_str(), &status) != 0) return false;
@@ -94,11 +94,11 @@ bool is_there(const std::filesystem::path& file) {
   return true;
 }
 
-/// What a killed run has left: a journal, or nothing yet.
+/// Throws Error unless a file is a journal, or empty.
 void expect_journal(const FileDescriptor& file) {
   std::string start(first_word.size(), '\0');
   start.resize(read_some(file, std::as_writable_bytes(std::span(start)), 0));
-  if (!first_word.starts_with(start))  // which a kill may have cut off
+  if (!first_word.starts_with(start))  // a kill may have cut it off
     throw Error("is in the way: it is not what palpate-precompute writes there", file.path().string(),
                 "Remove it, or choose another place with --output");
 }

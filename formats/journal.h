@@ -1,4 +1,5 @@
-// Which columns of a half-written model are done: PATH.progress, a text file that a killed run leaves behind.
+// Journal of the finished columns of a half-written model: PATH.progress, a text file that outlives a killed
+// run.
 #pragma once
 
 #include <cstdint>
@@ -19,24 +20,24 @@ struct PieceRange {
   friend bool operator==(const PieceRange&, const PieceRange&) = default;
 };
 
-/// Parts that a bake may have.
+/// Largest number of parts of a bake.
 constexpr std::int64_t most_parts = 100'000;
 
 /// A part of a bake, with a file of its own: number `number` of `parts`, from 1.
 struct BakePart {
   std::int64_t number = 1;
   std::int64_t parts = 1;
-  std::vector<PieceRange> pieces;  ///< that it has of each matrix
+  std::vector<PieceRange> pieces;  ///< pieces of each matrix in this part
   friend bool operator==(const BakePart&, const BakePart&) = default;
 };
 
-/// The part of PATH.partial that is finished before the columns arrive.
+/// Part of PATH.partial that is complete before columns arrive.
 struct JournalFrame {
-  std::string key;  ///< of the model that is being written
+  std::string key;  ///< key of the model being written
   std::int64_t file_bytes = 0;
-  std::string checksum;                 ///< of all bytes but the packed matrices
+  std::string checksum;                 ///< of all bytes except the packed matrices
   std::vector<std::int64_t> packed_at;  ///< first byte of each packed matrix
-  std::optional<BakePart> part;         ///< nothing of a whole model
+  std::optional<BakePart> part;         ///< nullopt for a whole model
 };
 
 /// Columns [first, first + count) of a packed matrix and the checksum of their bytes.
@@ -52,35 +53,35 @@ struct JournalContents {
   std::vector<JournalRange> ranges;
 };
 
-/// A range as a line of a journal, with its end.
+/// Journal line of a range, including its end.
 [[nodiscard]] std::string line_of(const JournalRange& range);
-/// A frame and ranges as the text of a journal.
+/// Journal text of a frame and ranges.
 [[nodiscard]] std::string text_of(const JournalContents& contents);
 
-/// Reads a line without its end; nothing when it is no range.
+/// Reads a line without its end; nullopt if it is no range.
 [[nodiscard]] std::optional<JournalRange> read_range(std::string_view line);
-/// Reads what `text_of` gave, of which a kill may have cut off the end; nothing when there is no complete
-/// frame. A line that was cut off ends the list.
+/// Reads a text made by `text_of`, which a kill may have cut off; nullopt without a complete frame. A
+/// truncated line ends the list.
 [[nodiscard]] std::optional<JournalContents> read_journal(std::string_view text);
-/// Reads a journal that another process may be writing. Throws Error where the file cannot be read.
+/// Reads a journal that another process may be writing. Throws Error if the file cannot be read.
 [[nodiscard]] std::optional<JournalContents> peek_journal(const std::filesystem::path& path);
 
-/// Throws Error where PATH.partial or PATH.progress, beside the model PATH, is something that no killed run
-/// of ours can have left: another's file, a link.
+/// Throws Error if PATH.partial or PATH.progress, beside the model PATH, is something that no killed run of
+/// ours can have left: another program's file, a link.
 void expect_own_journal(const std::filesystem::path& model);
 
-/// An open journal, held by one process at a time.
+/// An open journal, locked by one process at a time.
 class Journal {
  public:
-  /// Opens or makes it. Throws Error when another process holds it, or it is another's file.
+  /// Opens or creates it. Throws Error if another process has locked it, or it is another program's file.
   explicit Journal(const std::filesystem::path& path);
 
-  /// What a killed run left, as read_journal takes it.
+  /// Contents left by a killed run, as read_journal returns them.
   [[nodiscard]] std::optional<JournalContents> read() const;
 
-  void write(const JournalContents& contents);  ///< in place of what it held
-  void empty();                                 ///< forgets everything
-  void add(const JournalRange& range);          ///< one more line, in one write
+  void write(const JournalContents& contents);  ///< replaces the contents
+  void empty();                                 ///< removes the contents
+  void add(const JournalRange& range);          ///< appends a line, in one write
   void remove() noexcept;                       ///< deletes the file
 
  private:

@@ -1,4 +1,4 @@
-// The baked model: everything that NAME.palpate.hdf holds.
+// The baked model: the contents of NAME.palpate.hdf.
 #pragma once
 
 #include <array>
@@ -18,15 +18,15 @@ namespace palpate {
 
 struct HierarchicalMatrix;
 
-/// Which rows and columns of Xi are kept (theory.md section 2). All are exact; nodes outside carry no force.
+/// Rows and columns of Xi that are stored (theory.md section 2). All are exact; nodes outside carry no force.
 enum class Scope : std::uint8_t {
   surface,  ///< free nodes on the surface
-  layers,   ///< those and the free interior nodes within `layers` elements of the surface
+  layers,   ///< surface nodes and the free interior nodes within `layers` elements of the surface
   full,     ///< all free nodes
-  none,     ///< nothing: the body is for solvers that need no Green's functions
+  none,     ///< none: for solvers that need no Green's functions
 };
 
-/// One file that the model was made from, so that a stale model can be noticed.
+/// A file that the model was made from, recorded to detect stale models.
 struct SourceFile {
   std::string role;        ///< "model" for model.toml, "geometry" for the mesh, surface or image
   std::string path;        ///< relative to the folder of the baked file, '/' separated
@@ -34,15 +34,15 @@ struct SourceFile {
   std::string checksum;    ///< XXH3-128 of its bytes, 32 hexadecimal digits
 };
 
-/// A force on every stored dof and the displacement that it must give: lets anyone check a file without the
+/// Force on all stored dofs and the resulting displacement, with which a file can be verified without the
 /// model.
 struct Probe {
   std::vector<double> force;         ///< [n] on the stored dofs [N]
   std::vector<double> displacement;  ///< [n] of the stored dofs [m], by a sparse solve with K
 };
 
-/// Worst relative error of the forces of touches with a packed matrix stored in each Precision, measured when
-/// it was computed (docs/model-toml.md); infinity where a capacitance matrix is not positive definite.
+/// Worst relative force error of touches for a packed matrix in each Precision, measured when it was computed
+/// (docs/model-toml.md); infinity if a capacitance matrix is not positive definite.
 struct ForceErrors {
   static constexpr double not_measured = -1.0;
   std::array<double, 3> of_precision = {not_measured, not_measured, not_measured};
@@ -53,31 +53,31 @@ struct ForceErrors {
   [[nodiscard]] double& operator[](Precision precision) noexcept {
     return of_precision[static_cast<std::size_t>(precision)];
   }
-  /// Whether anything was measured.
+  /// True if any precision was measured.
   [[nodiscard]] bool any() const noexcept {
     return of_precision[0] >= 0.0 || of_precision[1] >= 0.0 || of_precision[2] >= 0.0;
   }
 };
 
-/// Force errors above it are warned of, and are not chosen by precision "auto" where another form has less.
+/// Force errors above it cause a warning, and precision "auto" avoids them if another form has less.
 inline constexpr double good_force_error = 1e-4;
 
-/// What overlays can be.
+/// Limits of overlays.
 inline constexpr int least_refinement = 2, most_refinement = 16, most_rings = 16;
 
-/// Overlays that were condensed ahead, each over the elements within some rings round one node.
+/// Overlays condensed in advance, each over the elements within some rings around one node.
 struct StoredOverlay {
-  int refinement = 0;                   ///< r: each element is cut into r^d; 0: none are stored
-  int rings = 0;                        ///< of elements round the centres
+  int refinement = 0;                   ///< r: each element is cut into r^d; 0: no overlays are stored
+  int rings = 0;                        ///< of elements around the centres
   std::vector<Index> centres;           ///< [P] mesh nodes on the surface, ascending
   std::vector<CondensedPatch> patches;  ///< [P]
 };
 
-/// How the body swings once it is let go.
+/// Method for the body's dynamics.
 enum class DynamicsMethod : std::uint8_t {
-  none,    ///< it does not: the file has no dynamics
+  none,    ///< no dynamics in the file
   packed,  ///< all stored dofs by the packed inverse of K_bar = K + a0 M + a1 C_d; scope full
-  modal,   ///< its lowest modes
+  modal,   ///< lowest modes
 };
 
 /// A symmetric sparse matrix pair of the stored dofs by columns of the lower triangle.
@@ -88,7 +88,7 @@ struct MassAndDamping {
   std::vector<double> damping;      ///< [entries] C_d [N s/m]
 };
 
-/// What Newmark's method needs (theory.md section 5).
+/// Input of Newmark's method (theory.md section 5).
 struct StoredDynamics {
   DynamicsMethod method = DynamicsMethod::none;
   bool lumped = false;  ///< M is diagonal
@@ -98,7 +98,7 @@ struct StoredDynamics {
   PackedGreens inverse;        ///< packed: K_bar^-1 of the stored dofs [m/N]
   ForceErrors force_errors;    ///< packed: of the inverse
   std::vector<double> omega;   ///< modal: [k + 1] angular frequencies [rad/s], ascending; the last is that of
-                               ///< the first mode that is not kept (infinity when all are)
+                               ///< the first mode not kept (infinity if all are)
   std::vector<double> shapes;  ///< modal: [k x n] the modes at the stored dofs, phi^T M phi = 1 [1/sqrt(kg)]
 
   [[nodiscard]] Index modes() const noexcept {  ///< k
@@ -106,30 +106,30 @@ struct StoredDynamics {
   }
 };
 
-/// How far off small strain and warping are over how far the body turns, against a corotational body of its
-/// mesh that a growing force on some nodes bends (docs/warp.md).
+/// Errors of small strain and of warping over the body's rotation, against a corotational body of the same
+/// mesh bent by a growing force on some nodes (docs/warp.md).
 struct WarpStudy {
-  /// Errors of one of the two at each level, relative to the corotational body; infinite where it has no
-  /// answer.
+  /// Errors of one of them at each level, relative to the corotational body; infinite where it has no
+  /// solution.
   struct Errors {
-    std::vector<double> force;         ///< [L] of the force that moves the nodes as far [-]
+    std::vector<double> force;         ///< [L] of the force for the same displacement of the nodes [-]
     std::vector<double> displacement;  ///< [L] of the nodes' mean displacement under the same force [-]
   };
 
-  std::vector<Index>
-      nodes;  ///< [P] mesh nodes on the surface that share the force, ascending; none: no study
-  Vec3 direction = Vec3::Zero();  ///< of the force at rest [-]; it turns with the nodes
+  std::vector<Index> nodes;  ///< [P] mesh nodes on the surface under the force, ascending; none: no study
+  Vec3 direction = Vec3::Zero();  ///< of the force at rest [-]; rotates with the nodes
   std::vector<double> force;      ///< [L] ascending [N]
-  std::vector<double> rotation;   ///< [L] of the corotational body's surface, at most, ascending [rad]
-  Errors linear;                  ///< by small strain
-  Errors warped;                  ///< by warping
+  std::vector<double> rotation;   ///< [L] largest rotation of the corotational body's surface, ascending
+                                  ///< [rad]
+  Errors linear;                  ///< of small strain
+  Errors warped;                  ///< of warping
 
   [[nodiscard]] bool any() const noexcept { return !nodes.empty(); }
 };
 
-/// Everything baked. Constant once loaded; shared by all threads.
-/// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
-/// A node that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
+/// All baked data. Constant once loaded, used by all threads. With d = dimension(), a stored dof is
+/// d k + axis for stored node k; `stored_nodes[k]` is its mesh node. A node held along some axes only is
+/// stored whole: rows and columns of its held dofs are zero.
 struct Model {
   std::string name;        ///< from model.toml
   std::string generator;   ///< program and version that wrote it
@@ -140,11 +140,12 @@ struct Model {
   Analysis analysis = Analysis::solid;
   double thickness = 1.0;                    ///< in the plane [m]; 1 in space
   std::vector<Material> materials;           ///< [M] at least one
-  std::vector<Index> material_of_element{};  ///< [E] which of them each element is made of
-  std::vector<std::uint8_t> fixed;           ///< [N] bit `axis` is set where the node is held along it
-  std::vector<Vec3> rest_force;              ///< [N] nodal force of the loads [N]: they act all the time
-  std::vector<Vec3> rest_displacement;  ///< [N] u0 [m]: K u0 = rest_force, held dofs as prescribed. What is
-                                        ///< seen is node + u0 + u; contact displaces relative to u0
+  std::vector<Index> material_of_element{};  ///< [E] index of each element's material
+  std::vector<std::uint8_t> fixed;           ///< [N] bit `axis` is set if the node is held along it
+  std::vector<Vec3> rest_force;              ///< [N] constant nodal force of the loads [N]
+  std::vector<Vec3> rest_displacement;       ///< [N] u0 [m]: K u0 = rest_force, held dofs as prescribed. The
+                                             ///< visible position is node + u0 + u; contact displaces
+                                             ///< relative to u0
   std::vector<Index>
       stored_nodes;  ///< [n/d] mesh node of each stored node, in the elimination order of the factor
   Scope scope = Scope::layers;
@@ -161,15 +162,15 @@ struct Model {
   ForceErrors force_errors;  ///< of greens
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 
-  /// d, dofs a node: 2 in the plane, 3 in space.
+  /// Dofs per node d: 2 in the plane, 3 in space.
   [[nodiscard]] int dimension() const noexcept { return mesh.dimension(); }
   [[nodiscard]] std::int64_t stored_dofs() const noexcept {
     return dimension() * static_cast<std::int64_t>(stored_nodes.size());
   }
 };
 
-/// A warning where the stored precision makes forces wrong by more than good_force_error, with the figure;
-/// empty where it does not, or where nothing was measured.
+/// Warning if the stored precision causes force errors above good_force_error, with the error; empty if not,
+/// or if nothing was measured.
 std::string precision_warning(const Model& model, Precision precision);
 
 }  // namespace palpate

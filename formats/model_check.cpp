@@ -18,7 +18,7 @@ namespace {
 
 constexpr double unit_tolerance = 1e-9;  // of a direction's length
 
-/// What the sizes of the patches' matrices ask for.
+/// Sets the counts that the sizes of the patches' matrices imply.
 void count_patches(const Model& model, Counts& counts) {
   counts.set(Count::patches, std::ssize(model.overlay.patches), "/overlay/centres");
   std::int64_t surface = 0, softening = 0, transfer = 0, compliance = 0;
@@ -79,7 +79,7 @@ void check_stored_nodes(const Model& model, const std::string& where) {
   }
 }
 
-/// Without Green's functions there is nothing that rests on them.
+/// Throws Error if a model without Green's functions has data that need them.
 void check_nothing_stored(const Model& model, const std::string& where) {
   if (!model.stored_nodes.empty())
     refuse(where, "/dofs/stored_nodes has " + std::to_string(model.stored_nodes.size()) +
@@ -94,7 +94,7 @@ void check_range(const char* path, int value, int low, int high, const std::stri
                       " to " + std::to_string(high) + " are possible");
 }
 
-/// Whether the patches belong to their fine meshes is seen when these are made.
+/// Checks the overlay. Patches are checked against their fine meshes when those are made.
 void check_overlay(const Model& model, const std::string& where) {
   const StoredOverlay& overlay = model.overlay;
   check_range("/overlay/refinement", overlay.refinement, least_refinement, most_refinement, where);
@@ -131,7 +131,7 @@ void check_loaded_nodes(const Model& model, const std::string& where) {
   }
 }
 
-/// Numbers that are positive and ascend.
+/// Checks that numbers are positive and ascending.
 void check_ascent(const char* path, const std::vector<double>& values, const std::string& where) {
   double before = 0.0;
   for (std::size_t k = 0; k < values.size(); ++k) {

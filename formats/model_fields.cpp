@@ -14,10 +14,10 @@ namespace {
 
 constexpr std::array analyses = {"solid", "plane_stress", "plane_strain"};
 constexpr std::array scopes = {"surface", "layers", "full", "none"};
-// A reader that does not know the second refuses it, and does not take R for Xi.
+// A reader that does not know the second name refuses the file instead of taking R for Xi.
 constexpr std::array precisions = {"float32", "float32+smooth", "float64"};
 
-/// Cuts the text before the next separator off the front.
+/// Removes the text before the next separator from the front and returns it.
 std::string_view cut(std::string_view& rest, char separator) {
   const std::size_t at = rest.find(separator);
   if (at == std::string_view::npos) throw Unreadable{"has an incomplete line"};
@@ -28,8 +28,8 @@ std::string_view cut(std::string_view& rest, char separator) {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Gives each patch its part of the values, as long as its size says. Throws Unreadable when they are not as
-/// many as all need.
+/// Distributes the values over the patches, as many to each as `size` says. Throws Unreadable unless the
+/// total is right.
 template <class T, class Size, class Put>
 void hand_out(Model& model, const std::vector<T>& values, Size&& size, Put&& put) {
   std::vector<CondensedPatch>& patches = model.overlay.patches;
@@ -59,7 +59,7 @@ std::vector<double> all_packed(const Model& model, Which&& which) {
   return values;
 }
 
-/// Whose columns are there already.
+/// Fills a matrix that already has its columns.
 void unpack(std::span<const double> packed, Eigen::MatrixXd& matrix) {
   const Eigen::Index order = matrix.cols();
   matrix.resize(order, order);
@@ -270,8 +270,8 @@ void put_centres(Model& model, const std::vector<std::int32_t>& values) {
   model.overlay.patches.resize(values.size());
 }
 
-// Before its entries are there, a matrix has columns but no rows: no memory is taken for what a file only
-// claims.
+// Until its entries are read, a matrix has columns but no rows: no memory is allocated for sizes that a file
+// merely claims.
 
 std::vector<std::int32_t> patch_node_counts(const Model& model) {
   std::vector<std::int32_t> counts;

@@ -1,5 +1,5 @@
-// The table of what NAME.palpate.hdf holds. Writer, reader, checks and content hash all walk it, so a field
-// that is added here is stored, loaded, checked and hashed.
+// The table of the fields of NAME.palpate.hdf. Writer, reader, checks and content hash all walk it, so that a
+// field added here is stored, loaded, checked and hashed.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// Counts that several fields share.
+/// Counts common to several fields.
 enum class Count : std::uint8_t {
   one,
   nodes,
@@ -36,7 +36,7 @@ enum class Count : std::uint8_t {
   far_pairs,
   clusters,
   certified,   // kinds of touches
-  warp_nodes,  // that were loaded
+  warp_nodes,  // loaded nodes
   warp_levels
 };
 inline constexpr std::size_t number_of_counts = 23;
@@ -48,7 +48,7 @@ struct Extent {
   std::int64_t plus = 0;
 };
 
-/// What the file says beside the model's own fields.
+/// Data of the file besides the model's own fields.
 struct FileHeader {
   Precision precision = Precision::double_precision;
 };
@@ -59,7 +59,7 @@ struct Attribute {
   const char* name;
   T (*take)(const Model&, const FileHeader&);  ///< its value for a model
   void (*put)(Model&, FileHeader&,
-              const T&);  ///< null: it must have the value that `take` gives; throws Unreadable
+              const T&);  ///< null: it must have the value that `take` returns; throws Unreadable
 };
 
 /// A dataset.
@@ -68,16 +68,16 @@ struct Field {
   const char* path;
   std::vector<Extent> shape;
   std::function<std::vector<T>(const Model&)> take;  ///< its values for a model
-  /// Null: it must have the values that `take` gives; throws Unreadable.
+  /// Null: it must have the values that `take` returns; throws Unreadable.
   std::function<void(Model&, const std::vector<T>&)> put;
   Extent below = {Count::one, 0, 0};  ///< integers: every value must be in [0, below); no limit when 0
-  bool infinite = false;              ///< numbers: infinity is a value too
+  bool infinite = false;              ///< numbers: infinity is allowed
 };
 
-/// More nodes on the surface of one patch are refused: its matrices' sizes would not be numbers.
+/// Largest number of nodes on the surface of one patch; with more its matrices' sizes would overflow.
 inline constexpr std::int64_t most_patch_surface_nodes = 1 << 28;
 
-/// Thrown by `put`: what is wrong with the values, without the field's name.
+/// Exception of `put`: the fault in the values, without the field's name.
 struct Unreadable {
   std::string what;
 };
@@ -104,8 +104,8 @@ std::vector<std::int32_t> patch_surface_counts(const Model& model);
 void put_patch_surface_counts(Model& model, const std::vector<std::int32_t>& values);
 std::vector<std::int32_t> patch_surface_nodes(const Model& model);
 void put_patch_surface_nodes(Model& model, const std::vector<std::int32_t>& values);
-/// Matrices of all patches, one after the other: symmetric matrices by their lower triangles, column by
-/// column, T by its rows.
+/// Matrices of all patches, one after the other: symmetric matrices as lower triangles, column by column, T
+/// by rows.
 std::vector<double> patch_softenings(const Model& model);
 void put_patch_softenings(Model& model, const std::vector<double>& values);
 std::vector<double> patch_transfers(const Model& model);
@@ -114,7 +114,7 @@ std::vector<double> patch_compliances(const Model& model);
 void put_patch_compliances(Model& model, const std::vector<double>& values);
 std::vector<double> warp_direction(const Model& model);
 void put_warp_direction(Model& model, const std::vector<double>& values);
-/// Errors of force and displacement by turns.
+/// Errors of force and displacement, alternating.
 std::vector<double> by_turns(const WarpStudy::Errors& errors);
 void put_by_turns(WarpStudy::Errors& errors, const std::vector<double>& values);
 
@@ -124,8 +124,8 @@ Analysis analysis_from(const std::string& text);
 Scope scope_from(const std::string& text);
 Precision precision_from(const std::string& text);
 
-/// Root attributes beside `format`, `version` and `content_hash`; the element kind comes before what it
-/// decides.
+/// Root attributes besides `format`, `version` and `content_hash`; the element kind comes before the
+/// attributes that depend on it.
 template <class Visitor>
 void for_each_attribute(Visitor&& visit) {
   using Text = std::string;
@@ -194,7 +194,7 @@ void for_each_mesh_field(ElementType element, Visitor&& visit) {
                             nodes});
 }
 
-/// What VTK asks for beside the soft links.
+/// Datasets that VTK requires besides the soft links.
 template <class Visitor>
 void for_each_vtk_field(Visitor&& visit) {
   using Int64s = std::vector<std::int64_t>;
@@ -214,8 +214,8 @@ void for_each_vtk_field(Visitor&& visit) {
       nullptr});
 }
 
-/// Datasets that are known before the Green's functions, of a body made of `element`; a field's counts and
-/// limits are set by those above it.
+/// Datasets known before the Green's functions, for a body made of `element`; a field's counts and limits are
+/// set by the fields before it.
 template <class Visitor>
 void for_each_body_field(ElementType element, Visitor&& visit) {
   using Octets = std::vector<std::uint8_t>;
@@ -273,7 +273,7 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
   for_each_vtk_field(visit);
 }
 
-/// Datasets that are added last.
+/// Datasets added last.
 template <class Visitor>
 void for_each_probe_field(ElementType element, Visitor&& visit) {
   const std::vector<Extent> shape = {{Count::probes}, {Count::stored_nodes, traits(element).dimension, 0}};
@@ -306,7 +306,7 @@ void for_each_probe_field(ElementType element, Visitor&& visit) {
 
 inline constexpr const char* overlay_group = "/overlay";
 
-/// Datasets of files that hold overlays; others do not have the group.
+/// Datasets of files with overlays; other files do not have the group.
 template <class Visitor>
 void for_each_overlay_field(Visitor&& visit) {
   using Int32s = std::vector<std::int32_t>;
@@ -345,7 +345,7 @@ void for_each_overlay_field(Visitor&& visit) {
 
 inline constexpr const char* warp_group = "/warp";
 
-/// Datasets of files that hold a study of [warp]; others do not have the group.
+/// Datasets of files with a study of [warp]; other files do not have the group.
 template <class Visitor>
 void for_each_warp_field(Visitor&& visit) {
   using Doubles = std::vector<double>;
@@ -379,8 +379,8 @@ void for_each_warp_field(Visitor&& visit) {
                       infinite});
 }
 
-/// Every dataset but those of overlays, dynamics and [warp], and the Green's functions, which are mapped and
-/// not copied.
+/// All datasets except those of overlays, dynamics and [warp], and except the Green's functions, which are
+/// mapped and not copied.
 template <class Visitor>
 void for_each_field(ElementType element, Visitor&& visit) {
   for_each_body_field(element, visit);

@@ -100,7 +100,7 @@ void Reader::read_body() {
   for_each_body_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
 }
 
-/// What is known before the Green's functions.
+/// Reads everything before the Green's functions.
 void Reader::read_known() {
   read_body();
   if (model_.scope == Scope::none &&
@@ -195,14 +195,14 @@ ChunkedChecksum::Inspect Reader::first_not_finite(std::atomic<std::size_t>& firs
   };
 }
 
-/// Memory for a packed matrix; null where it takes too much.
+/// Memory for a packed matrix; null if it is larger than the limit.
 std::shared_ptr<std::byte> Reader::room_for(const Stored& packed) const {
   const std::int64_t most = options_.most_in_memory < 0 ? available_memory() / 2 : options_.most_in_memory;
   const std::shared_ptr<void> memory = packed.bytes <= most ? map_memory(packed.bytes) : nullptr;
   return {memory, static_cast<std::byte*>(memory.get())};
 }
 
-/// A dof's own compliance is positive; zero where it is held.
+/// Checks that a dof's own compliance is positive, or zero if the dof is held.
 void Reader::check_diagonal(const std::string& path, std::int64_t i, double entry) const {
   const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
   const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
@@ -211,7 +211,7 @@ void Reader::check_diagonal(const std::string& path, std::int64_t i, double entr
                        (held ? "zero, though its dof is held" : "positive"));
 }
 
-/// Reads or maps an array of float or double and proves its checksum and that all is finite.
+/// Reads or maps an array of float or double and checks its checksum and that all values are finite.
 std::shared_ptr<const void> Reader::read_scalars(const std::string& path, const Stored& stored, bool single) {
   if (stored.offset % (single ? 4 : 8) != 0)
     refuse(where_, path + " does not start at a multiple of its scalar's size");
@@ -229,7 +229,7 @@ std::shared_ptr<const void> Reader::read_scalars(const std::string& path, const 
   return map_file(file_.file(), stored.offset, stored.bytes);
 }
 
-/// Green's functions in nested low-rank form.
+/// Reads Green's functions in nested low-rank form.
 void Reader::read_compressed() {
   for_each_tree_field([this](const auto& field) { read_field(field); });
   check_tree(model_, where_);
@@ -256,7 +256,7 @@ void Reader::read_compressed() {
   }
 }
 
-/// Reads or maps a packed matrix of the stored dofs and proves its values.
+/// Reads or maps a packed matrix of the stored dofs and checks its values.
 PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
   const std::int64_t order = model_.stored_dofs();
   const bool single = has_float_entries(header_.precision);
@@ -270,12 +270,12 @@ PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const 
   return matrix;
 }
 
-/// Every dataset agrees with its own checksum by now; what is left are the attributes.
+/// Checks the content hash. Every dataset matches its own checksum by now; the attributes remain.
 void Reader::check_content(const std::vector<std::int64_t>& version) {
   const auto stored = file_.text_attribute("/", "content_hash");
   if (!stored) refuse(where_, "the attribute content_hash is missing: the file was not finished");
   model_.content_hash = *stored;
-  if (version[1] > format_minor) return;  // its hash covers fields that are not known here
+  if (version[1] > format_minor) return;  // its hash covers fields unknown here
   add_attributes(content_, model_, header_, version);
   if (content_.digits() != *stored)
     refuse(where_, "an attribute of the file or a checksum was altered: content_hash is " + *stored +
@@ -307,7 +307,7 @@ std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial)
   try {
     return Reader(Contents::read(partial), {}).read_begun();
   } catch (const Error&) {
-    return {};  // it is begun anew
+    return {};  // it starts from the beginning
   }
 }
 

@@ -17,9 +17,9 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t beginning = 4096;  // bytes that tell what a file is
+constexpr std::size_t beginning = 4096;  // bytes that identify a file
 
-/// At most so many bytes of a file; nothing where it cannot be read.
+/// The first bytes of a file, at most `beginning`; nullopt if it cannot be read.
 std::optional<std::string> first_bytes(const std::filesystem::path& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return std::nullopt;
@@ -31,7 +31,7 @@ std::optional<std::string> first_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-/// The attribute `format` of a file with an index.
+/// Attribute `format` of a file with an index.
 std::string indexed_format(const std::filesystem::path& file) {
   try {
     return Contents::read(file).text_attribute("/", "format").value_or("");
@@ -44,7 +44,7 @@ bool contains(std::string_view text, std::string_view piece) {
   return text.find(piece) != std::string_view::npos;
 }
 
-/// A file of XML is ours by the comment that we begin it with, or as versions before that comment began it.
+/// True for XML files of ours, which begin with our comment or, from versions before it, with the given text.
 bool is_our_xml(std::string_view text, std::string_view before_there_was_a_mark) {
   constexpr std::string_view head = "<?xml version=\"1.0\"?>\n";
   if (!text.starts_with(head)) return false;
@@ -58,7 +58,7 @@ bool is_our_report(std::string_view text) {
          contains(text, "\n  \"tool\": ");
 }
 
-/// An OFF file of triangles that share no corners.
+/// True for an OFF file of triangles that have no common corners.
 bool is_loose_triangles(const std::string& text) {
   std::istringstream words(text);
   std::string head;

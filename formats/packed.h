@@ -10,19 +10,19 @@
 
 namespace palpate {
 
-/// How a packed matrix is stored. All arithmetic is done in double.
+/// Storage of a packed matrix. All arithmetic is in double.
 enum class Precision : std::uint8_t {
   single_precision,  ///< its entries as float
   split_precision,   ///< A = R + W W^T: a smooth part W in double, the entries of the remainder R as float
   double_precision,  ///< its entries as double
 };
 
-/// As model.toml calls it.
+/// Name in model.toml.
 constexpr const char* name_of(Precision p) {
   return p == Precision::single_precision ? "single" : p == Precision::split_precision ? "split" : "double";
 }
 
-/// Whether the packed entries are float.
+/// True if the packed entries are float.
 constexpr bool has_float_entries(Precision p) {
   return p != Precision::double_precision;
 }
@@ -47,21 +47,21 @@ constexpr std::int64_t packed_column(std::int64_t j, std::int64_t order) {
   return packed_index(j, j, order);
 }
 
-/// More terms of a smooth part are refused: a tick keeps as many numbers on its stack.
+/// Largest number of terms of a smooth part, since a tick keeps that many numbers on its stack.
 inline constexpr std::int64_t most_smooth_terms = 256;
 
-/// W of a matrix A = R + W W^T whose remainder R is rounded to single: what neighbouring columns of A have in
-/// common is in W, so that little of it is in R and its rounding.
+/// W of a matrix A = R + W W^T whose remainder R is rounded to single: W holds the part that neighbouring
+/// columns of A have in common, so that R and its rounding errors are small.
 struct SmoothPart {
   std::int64_t terms = 0;    ///< k, columns of W
   std::vector<double> rows;  ///< [n x k] row-major
 
-  /// [k] Row of W of a dof.
+  /// [k] Row of W for a dof.
   [[nodiscard]] const double* row(std::int64_t dof) const noexcept { return rows.data() + dof * terms; }
   /// Entry (i, j) of W W^T.
   [[nodiscard]] double operator()(std::int64_t i, std::int64_t j) const noexcept {
     const double *a = row(i), *b = row(j);
-    std::array<double, 8> lanes{};  // so that the compiler may add up side by side
+    std::array<double, 8> lanes{};  // eight sums that the compiler can vectorise
     std::int64_t k = 0;
     for (; k + 8 <= terms; k += 8)
       for (std::size_t lane = 0; lane < 8; ++lane)
@@ -71,8 +71,8 @@ struct SmoothPart {
   }
 };
 
-/// The block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs. Read-only; usually a mapping
-/// of the file. Copies share the data.
+/// Block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs. Read-only; usually a mapping of
+/// the file. Copies share the data.
 class PackedGreens {
  public:
   PackedGreens() = default;
@@ -88,24 +88,24 @@ class PackedGreens {
   [[nodiscard]] const void* data() const noexcept { return data_.get(); }
   /// W of split precision, null otherwise.
   [[nodiscard]] const std::shared_ptr<const SmoothPart>& smooth() const noexcept { return smooth_; }
-  /// The matrix is this times what is stored, W W^T included.
+  /// Factor on all stored entries, W W^T included.
   [[nodiscard]] double scale() const noexcept { return scale_; }
 
-  /// The matrix times `factor`, of the same data.
+  /// The matrix times `factor`, with the same data.
   [[nodiscard]] PackedGreens scaled(double factor) const {
     PackedGreens copy = *this;
     copy.scale_ *= factor;
     return copy;
   }
 
-  /// All packed_size(order()) entries as they are stored, without scale and smooth part; T (float or double)
-  /// must be the stored scalar.
+  /// All packed_size(order()) entries as stored, without scale and smooth part; T (float or double) must be
+  /// the stored scalar.
   template <class T>
   [[nodiscard]] std::span<const T> as() const noexcept {
     return {static_cast<const T*>(data_.get()), static_cast<std::size_t>(packed_size(order_))};
   }
 
-  /// Entry (i, j) of what is stored times scale, without the smooth part; either triangle.
+  /// Stored entry (i, j) times scale, without the smooth part; either triangle.
   [[nodiscard]] double stored(std::int64_t i, std::int64_t j) const noexcept {
     const auto k = static_cast<std::size_t>(i >= j ? packed_index(i, j, order_) : packed_index(j, i, order_));
     return scale_ * (has_float_entries(precision_) ? static_cast<double>(as<float>()[k]) : as<double>()[k]);

@@ -1,4 +1,4 @@
-// The part of the file's table that is about the precision of packed matrices.
+// Precision of packed matrices in the table of file fields.
 #pragma once
 
 #include "formats/model_fields.h"
@@ -12,7 +12,7 @@ void put_greens_smooth(Model& model, const std::vector<double>& values);
 void put_inverse_smooth(Model& model, const std::vector<double>& values);
 void put_errors(ForceErrors& errors, const std::vector<double>& values);
 
-/// Smooth parts W of files with split precision; others have none.
+/// Smooth parts W of files with split precision; other files have none.
 template <class Visitor>
 void for_each_smooth_field(const Model& model, Visitor&& visit) {
   const Extent stored_dofs = {Count::stored_nodes, model.dimension(), 0}, terms = {Count::smooth_terms};
@@ -28,7 +28,7 @@ void for_each_smooth_field(const Model& model, Visitor&& visit) {
   }
 }
 
-/// What was measured of Xi.
+/// Measured force errors of Xi.
 template <class Visitor>
 void visit_greens_errors(Visitor&& visit) {
   visit(Field<double>{greens_errors_path,
@@ -42,7 +42,7 @@ void visit_greens_errors(Visitor&& visit) {
                       true});
 }
 
-/// What was measured of K_bar^-1.
+/// Measured force errors of K_bar^-1.
 template <class Visitor>
 void visit_inverse_errors(Visitor&& visit) {
   visit(Field<double>{inverse_errors_path,
@@ -56,9 +56,9 @@ void visit_inverse_errors(Visitor&& visit) {
                       true});
 }
 
-/// Proves that smooth parts are there with split precision and only then, have a row of at most
-/// most_smooth_terms entries for each stored dof, zero where it is held, and that what was measured is of the
-/// stored precision too. Throws Error (where = `where`) naming the field.
+/// Checks that smooth parts exist with split precision only, with a row of at most most_smooth_terms entries
+/// for each stored dof, zero if it is held, and that force errors were measured for the stored precision if
+/// at all. Throws Error (where = `where`) naming the field.
 void check_precision(const Model& model, Precision precision, const std::string& where);
 
 }  // namespace palpate

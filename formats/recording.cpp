@@ -19,7 +19,7 @@
 
 namespace palpate {
 
-/// Says what is wrong with a number of a message.
+/// Throws Error for an invalid number of a message.
 class RecordingChecker {
  public:
   explicit RecordingChecker(std::string where) : where_(std::move(where)) {}
@@ -49,10 +49,10 @@ constexpr const char* give_another = "Give a recording that palpate-runtime has 
 constexpr const char* record_again = "Record the session again";
 constexpr double longest_time = 1e9;                                          // s
 constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  // ns
-constexpr std::int64_t highest_rate = 1'000'000;                              // ticks a second
+constexpr std::int64_t highest_rate = 1'000'000;                              // ticks per second
 constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 
-/// Says what a file with an index is: models are, and what is exported of recordings.
+/// Throws Error saying what a file with an index is: a model, or an export of a recording.
 [[noreturn]] void refuse_indexed(const std::filesystem::path& path) {
   const std::string format = Contents::read(path).text_attribute("/", "format").value_or("");
   if (format == "palpate")
@@ -73,7 +73,7 @@ mcap::Layout layout_of(const FileDescriptor& file) {
   return mcap::read_layout(file);
 }
 
-/// What is said of the run. Throws Error unless it is a recording of this version.
+/// Reads the description of the run. Throws Error unless it is a recording of this version.
 SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::string& generator) {
   const auto said = std::ranges::find(layout.metadata, "palpate", &mcap::Metadata::name);
   const auto value = [&](const char* key) {
@@ -165,7 +165,7 @@ void check_loads(const ContactLoads& loads, std::size_t nodes, std::size_t row,
 }  // namespace
 
 struct RecordingFile::Impl {
-  /// A message that is read when it is asked for.
+  /// Place of a message that is read on demand.
   struct Place {
     std::uint64_t chunk;
     std::uint64_t offset;
@@ -191,7 +191,7 @@ struct RecordingFile::Impl {
     records = {};
   }
 
-  /// Nothing for a channel that is not ours.
+  /// Kind of a channel; nullopt if it is not ours.
   [[nodiscard]] std::optional<RecordedChannel> kind_of(std::uint16_t channel) const {
     for (const auto& [id, kind] : kinds)
       if (id == channel) return kind;
@@ -223,7 +223,7 @@ struct RecordingFile::Impl {
     }
   }
 
-  /// Length of a message with a picture.
+  /// Length of a message with a picture [byte].
   [[nodiscard]] std::uint64_t picture_bytes() const {
     const std::size_t numbers = surface->nodes.size();
     return to_message(SurfaceFrame{}).size() + 5 * sizeof(float) * numbers;
@@ -266,7 +266,7 @@ struct RecordingFile::Impl {
     ++ticks;
   }
 
-  /// Puts a chunk into memory.
+  /// Reads a chunk into memory.
   void load(std::uint64_t chunk) {
     if (chunk_in_memory == chunk) return;
     chunk_in_memory = no_chunk;

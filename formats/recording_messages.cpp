@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// Makes the definition of a tick.
+/// Builds the definition of a tick's message.
 class Definition {
  public:
   std::string text =
@@ -87,7 +87,7 @@ constexpr const char* log_definition =
 constexpr const char* log_parts[][2] = {{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"}};
 constexpr std::uint8_t log_info = 20;  // level of rcl_interfaces/Log
 
-/// Writes a tick.
+/// Encodes a tick.
 struct TickWriter {
   CdrWriter& to;
 
@@ -110,7 +110,7 @@ struct TickWriter {
   }
 };
 
-/// Reads a tick.
+/// Decodes a tick.
 struct TickReader {
   CdrReader& from;
 
@@ -133,7 +133,7 @@ struct TickReader {
   }
 };
 
-/// A message of these, one after another.
+/// Message of these values, one after another.
 std::string message_of(const auto&... values) {
   std::string message;
   CdrWriter to(message);
@@ -141,7 +141,7 @@ std::string message_of(const auto&... values) {
   return message;
 }
 
-/// Whether a message is these, and nothing else; they are read from it.
+/// Decodes these values; true if the message is exactly these.
 bool is_read(std::string_view message, auto&... values) {
   CdrReader from(message);
   (from.get(values), ...);

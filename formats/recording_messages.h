@@ -1,6 +1,6 @@
-// The messages of a recording: their definitions, and how they are written and read, in CDR as ROS 2 has it:
-// numbers one after another, little-endian, each aligned to its own size from the end of the first four bytes
-// on. docs/recording-format.md has their layout.
+// Messages of a recording: definitions, encoding and decoding, in CDR as used by ROS 2: numbers one after
+// another, little-endian, each aligned to its own size, counted from the end of the first four bytes.
+// docs/recording-format.md has their layout.
 #pragma once
 
 #include <array>
@@ -20,9 +20,9 @@ namespace palpate {
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as memory has them");
 
-inline constexpr std::string_view cdr_head{"\0\1\0\0", 4};  ///< of a message: little-endian
+inline constexpr std::string_view cdr_head{"\0\1\0\0", 4};  ///< head of a message: little-endian
 
-/// Appends a message to text.
+/// Encoder that appends a message to a text.
 class CdrWriter {
  public:
   explicit CdrWriter(std::string& text) : text_(text) {
@@ -40,7 +40,7 @@ class CdrWriter {
   void put(const T& value) { number(value); }
   template <class T>
   requires std::is_arithmetic_v<T>
-  void put(const std::vector<T>& values) {  ///< with their count
+  void put(const std::vector<T>& values) {  ///< preceded by their count
     number(static_cast<std::uint32_t>(values.size()));
     if (values.empty()) return;
     align(sizeof(T));
@@ -62,8 +62,8 @@ class CdrWriter {
   std::size_t origin_;
 };
 
-/// Reads a message from anywhere. What is not there reads as zero or nothing, and `is_whole` is false then.
-/// Never takes more memory than the message has.
+/// Decoder of an untrusted message. Missing data read as zero or empty, and `is_whole` is then false. Never
+/// allocates more memory than the message takes.
 class CdrReader {
  public:
   explicit CdrReader(std::string_view message) : rest_(message), whole_(message.starts_with(cdr_head)) {
@@ -84,7 +84,7 @@ class CdrReader {
     value = number<T>();
   }
   template <class T>
-  void get(std::vector<T>& values) {  ///< with their count
+  void get(std::vector<T>& values) {  ///< preceded by their count
     values.clear();
     const std::size_t count = number<std::uint32_t>();
     if (count == 0) return;
@@ -94,7 +94,7 @@ class CdrReader {
     if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   }
 
-  /// Whether all that was asked for was there, and nothing else is.
+  /// True if all requested data were present and nothing is left.
   [[nodiscard]] bool is_whole() const noexcept { return whole_ && rest_.empty(); }
 
  private:
@@ -111,13 +111,13 @@ class CdrReader {
   void align(std::size_t size) { take((rest_.size() - size_) % size); }
 
   std::string_view rest_;
-  std::size_t size_ = 0;  // of what comes after the head
+  std::size_t size_ = 0;  // of the message after its head
   bool whole_;
 };
 
-/// Visits the fields of a tick in the order of its message: `number(type, name, member)`, or for what has
-/// several numbers `vector(name, member)`, `pose(name, position, orientation)`, `wrench(name, force, torque)`
-/// and `numbers(name, member)`. `Tick` may be const.
+/// Visits the fields of a tick in the order of its message: `number(type, name, member)`, and for several
+/// numbers `vector(name, member)`, `pose(name, position, orientation)`, `wrench(name, force, torque)` and
+/// `numbers(name, member)`. `Tick` may be const.
 template <class Tick, class Visitor>
 void for_each_tick_field(Tick& tick, Visitor&& visit) {
   visit.number("float64", "time", tick.time);
@@ -147,15 +147,15 @@ void for_each_tick_field(Tick& tick, Visitor&& visit) {
   visit.number("uint8", "event", tick.event);
 }
 
-/// The channels of a recording, which have these numbers in the files that we write.
+/// Channels of a recording, with their numbers in the files that we write.
 enum class RecordedChannel : std::uint16_t { tick = 1, contacts, pictures, events, settings, surface };
 
-/// A channel, and the messages on it.
+/// A channel and the type of its messages.
 struct ChannelKind {
   RecordedChannel channel;
   const char* topic;
   const char* schema;
-  std::string definition;  ///< ros2msg, with all that it needs
+  std::string definition;  ///< ros2msg, with all dependencies
 };
 
 /// All channels.
@@ -163,19 +163,20 @@ struct ChannelKind {
 
 [[nodiscard]] std::string to_message(const TickRecord& tick);
 [[nodiscard]] std::string to_message(const ContactLoads& loads);
-/// Without stress or pressure (empty): not a number, and none.
+/// Empty stress or pressure is written as NaN or as none.
 [[nodiscard]] std::string to_message(const SurfaceFrame& frame);
 [[nodiscard]] std::string to_message(const RecordedEvent& event);
 [[nodiscard]] std::string to_message(const RecordedSurface& surface);
-/// The lines "name=value".
+/// Message of the lines "name=value".
 [[nodiscard]] std::string settings_message(std::string_view options);
 
-// Bytes from anywhere do no harm. False, and what was read is of no use, unless they are one whole message.
+// The bytes are untrusted. Returns false, with unusable contents, unless they are one whole message.
 [[nodiscard]] bool from_message(std::string_view message, TickRecord& tick);
 [[nodiscard]] bool from_message(std::string_view message, ContactLoads& loads);
 [[nodiscard]] bool from_message(std::string_view message, SurfaceFrame& frame);
 [[nodiscard]] bool from_message(std::string_view message, RecordedSurface& surface);
-/// The tick and time that messages on contacts and pictures begin with; `start` is cut off anywhere.
+/// Reads the tick and time at the beginning of messages on contacts and pictures; `start` may be truncated
+/// anywhere.
 [[nodiscard]] bool from_start(std::string_view start, PictureTime& time);
 
 }  // namespace palpate

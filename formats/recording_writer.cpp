@@ -28,14 +28,14 @@ bool is_same_file(const FileDescriptor& file, const std::filesystem::path& path)
   throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere");
 }
 
-/// Makes PATH.partial, or takes over one that a program left which was killed, and locks it: of all that
-/// begin to record to PATH at once one has it.
+/// Creates PATH.partial, or takes over one from a killed program, and locks it: of several programs that
+/// begin to record to PATH at once, one gets it.
 FileDescriptor make_locked(const std::filesystem::path& path, const std::filesystem::path& partial) {
   for (std::size_t step = 0; step < most_steps; ++step) {
     open_file(partial, OpenMode::read_append).close();
     FileDescriptor file = open_file(partial, OpenMode::write);
     if (!lock_file(file)) break;
-    if (!is_same_file(file, partial)) continue;  // it has become a recording meanwhile
+    if (!is_same_file(file, partial)) continue;  // it was renamed to a recording meanwhile
     if (::ftruncate(file.get(), 0) == 0) return file;
   }
   refuse_second(path);

@@ -5,12 +5,12 @@
 namespace palpate {
 namespace {
 
-/// The folder of a file, of the file itself where `file` is a symbolic link.
+/// Folder of a file; for a symbolic link that of the file it points to.
 std::filesystem::path folder_of(const std::filesystem::path& file) {
   return std::filesystem::weakly_canonical(std::filesystem::absolute(file)).parent_path();
 }
 
-/// What became of a source that is there; empty when it is as it was.
+/// Description of the change of an existing source; empty if it is unchanged.
 std::string change_of(const SourceFile& source, const std::filesystem::path& file, const std::string& baked) {
   const std::string name = source.path + " (" + source.role + ")";
   std::error_code error;

@@ -20,15 +20,15 @@ constexpr std::uint64_t index_head = 6;       // of a message index, before its 
 constexpr std::uint64_t most_text = 1 << 20;  // of a header, metadata, schema or channel [byte]
 constexpr std::size_t most_texts = 1000;      // of each of these
 constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;  // [byte]
-constexpr std::size_t window = 64;                              // what is read of a record at first [byte]
+constexpr std::size_t window = 64;                              // bytes of a record that are read at first
 constexpr const char* hint = "Copy the file again, or record the session again";
 
-/// The fields of a record, from anywhere: what is not there reads as zero or nothing, and `whole` is false.
+/// Fields of an untrusted record: missing data read as zero or empty, and `whole` is then false.
 class Fields {
  public:
   explicit Fields(std::string_view bytes) : rest_(bytes) {}
 
-  /// The next ones: numbers, texts and maps.
+  /// Reads the next fields: numbers, texts and maps.
   void read(auto&... values) { (get(values), ...); }
   [[nodiscard]] bool whole() const noexcept { return whole_; }
 
@@ -78,7 +78,7 @@ std::string read_bytes(const FileDescriptor& file, std::uint64_t offset, std::ui
   return bytes;
 }
 
-/// Goes from record to record.
+/// Walk from record to record.
 class Walk {
  public:
   explicit Walk(const FileDescriptor& file)
@@ -103,7 +103,7 @@ class Walk {
  private:
   [[noreturn]] void refuse(const std::string& what) const { mcap::refuse(file_.path(), at_, what); }
 
-  /// The record at `at_`; false where the file ends within it.
+  /// Reads the head of the record at `at_`; false if the file ends within it.
   bool next() {
     opcode_ = 0;
     if (size_ - at_ < head_bytes) return false;
@@ -119,7 +119,7 @@ class Walk {
   }
   void pass() { at_ += head_bytes + length_; }
 
-  /// This record, one of as many already.
+  /// Decodes this record; `all` are the earlier ones of its kind.
   template <class T>
   T record(const std::vector<T>& all, const char* what) const {
     if (length_ > most_text || all.size() >= most_texts) refuse("is more than there is room for");
@@ -131,7 +131,7 @@ class Walk {
     return one;
   }
 
-  /// Takes note of a record of the data.
+  /// Handles a record of the data section.
   void take() {
     switch (opcode_) {
       case op_schema:
@@ -206,7 +206,7 @@ class Walk {
     chunk.index_length += head_bytes + length_;
   }
 
-  /// From behind the end of the data to the file's end.
+  /// Checks the file from the end of the data on; true if its end is complete.
   bool has_end() {
     const std::uint64_t summary = at_;
     for (; next(); pass()) {
@@ -257,7 +257,7 @@ Message message_head_of(std::string_view content) {
   return message;
 }
 
-/// The length of a message's record in a chunk, of which `rest` bytes are left; 0 where it is none.
+/// Length of a message's record in a chunk with `rest` bytes left; 0 if it is not a message.
 std::uint64_t message_length(std::string_view head, std::uint64_t rest) {
   std::uint8_t opcode = 0;
   std::uint64_t length = 0;

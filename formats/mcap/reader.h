@@ -1,4 +1,4 @@
-// Reads MCAP files, whoever made them.
+// Reader of MCAP files of any origin.
 #pragma once
 
 #include <cstddef>
@@ -14,27 +14,27 @@ struct Message {
   std::uint32_t sequence = 0;
   std::uint64_t time = 0;  ///< [ns]
   std::string_view data{};
-  std::uint64_t offset = 0;  ///< of its record from the chunk's first one on
-  std::uint64_t end = 0;     ///< of the record after it
+  std::uint64_t offset = 0;  ///< of its record, from the chunk's first record
+  std::uint64_t end = 0;     ///< of the next record
 };
 
-/// Walks over the records of a file that may be anybody's: each length is compared with the file's before
-/// memory is taken, and a record that the file's end cuts off ends what there is. Throws Error where it is no
-/// MCAP file, or breaks the format's rules.
+/// Walks over the records of an untrusted file: each length is compared with the file's before memory is
+/// allocated, and a truncated record ends the layout. Throws Error if it is no MCAP file or breaks the
+/// format's rules.
 Layout read_layout(const FileDescriptor& file);
 
-/// The records of a chunk. Throws Error where their CRC is another one.
+/// Records of a chunk. Throws Error if their CRC does not match.
 std::string read_chunk(const FileDescriptor& file, const ChunkPlace& chunk);
 
-/// The message whose record begins so many bytes after that of the first. Throws Error (where = `file`) where
-/// there is none.
+/// Message whose record begins at this offset from the first record. Throws Error (where = `file`) if there
+/// is none.
 Message message_at(const std::filesystem::path& file, std::string_view records, std::uint64_t offset);
 
-/// The messages of a chunk's records, in their order. Throws Error (where = `file`) where these are broken.
+/// Messages of a chunk's records, in order. Throws Error (where = `file`) if the records are damaged.
 std::vector<Message> messages_of(const std::filesystem::path& file, std::string_view records);
 
-/// These with the first bytes of their data only, read from the file one by one, without a look at the
-/// CRC: of a chunk of few large messages.
+/// A message with only the first bytes of its data, read from the file by itself and without checking the
+/// CRC; for chunks of few large messages.
 struct MessageStart {
   Message message;         ///< data: none
   std::string first{};     ///< bytes of its data, at most 32

@@ -1,5 +1,5 @@
 // MCAP files, version 0 (mcap.dev/spec), as far as recordings need them: messages in uncompressed chunks.
-// What readers (reader.h) and writers (writer.h) share.
+// Definitions common to readers (reader.h) and writers (writer.h).
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ inline constexpr std::uint64_t index_entry = 16;   ///< of a message index
 
 using TextMap = std::map<std::string, std::string>;
 
-// `fields` gives all that a record has in a file, in its order, to what writes or reads it.
+// `fields` passes the members of a record, in the file's order, to the visitor that writes or reads them.
 
 struct Schema {
   std::uint16_t id = 0;
@@ -69,37 +69,37 @@ struct Metadata {
   static void fields(auto& of, auto&& visit) { visit(of.name, of.values); }
 };
 
-/// The index of a channel's messages in a chunk.
+/// Index of a channel's messages in a chunk.
 struct MessageIndex {
   std::uint16_t channel = 0;
-  std::uint64_t offset = 0;  ///< of its record in the file
+  std::uint64_t offset = 0;  ///< position of its record in the file
   std::uint64_t count = 0;
 };
 
 /// A chunk in a file.
 struct ChunkPlace {
-  std::uint64_t offset = 0;   ///< of its record in the file
+  std::uint64_t offset = 0;   ///< position of its record in the file
   std::uint64_t length = 0;   ///< [byte] of the record
   std::uint64_t records = 0;  ///< offset in the file of the records in it
-  std::uint64_t size = 0;     ///< [byte] of these
-  std::uint32_t crc = 0;      ///< of these
+  std::uint64_t size = 0;     ///< [byte] of the records
+  std::uint32_t crc = 0;      ///< of the records
   std::uint64_t first = 0;    ///< time of the earliest message [ns]
-  std::uint64_t last = 0;     ///< and of the latest [ns]
+  std::uint64_t last = 0;     ///< time of the latest message [ns]
   std::vector<MessageIndex> index{};
   std::uint64_t index_length = 0;  ///< [byte] of all records of the index
 };
 
-/// What of a file is found without its messages.
+/// Contents of a file except its messages.
 struct Layout {
   std::vector<Metadata> metadata;
   std::vector<Schema> schemas;
   std::vector<Channel> channels;
   std::vector<ChunkPlace> chunks;
-  std::uint64_t end = 0;  ///< [byte] of the last whole record before the end of the data
+  std::uint64_t end = 0;  ///< end [byte] of the last whole record before the end of the data
   bool finished = false;  ///< the end of the data, the index and the last magic are there
 };
 
-/// CRC-32 of these bytes behind those whose CRC is `before`.
+/// CRC-32 of `bytes` appended to bytes whose CRC is `before`.
 [[nodiscard]] std::uint32_t crc_of(std::string_view bytes, std::uint32_t before = 0);
 
 }  // namespace palpate::mcap

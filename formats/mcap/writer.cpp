@@ -36,7 +36,7 @@ void put(std::string& bytes, const TextMap& map) {
   put(bytes, entries);
 }
 
-/// Numbers, texts and maps one after another.
+/// Appends numbers, texts and maps one after another.
 void put_all(std::string& bytes, const auto&... values) {
   (put(bytes, values), ...);
 }
@@ -99,7 +99,7 @@ void Chunk::append(std::uint16_t channel, std::uint32_t sequence, std::uint64_t 
   last_ = std::max(last_, time);
   index_[channel].push_back({time, records_.size()});
   put_head(records_, op_message, message_head + data.size());
-  put_all(records_, channel, sequence, time, time);  // when it was logged and published
+  put_all(records_, channel, sequence, time, time);  // times of logging and publishing
   records_ += data;
 }
 

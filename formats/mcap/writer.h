@@ -1,4 +1,4 @@
-// Writes MCAP files that only grow.
+// Writer of MCAP files that only grow.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace palpate::mcap {
 
-/// Messages on their way into a file.
+/// Messages collected for the file.
 class Chunk {
  public:
   void append(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time, std::string_view data);
@@ -25,23 +25,24 @@ class Chunk {
   std::uint64_t first_ = 0, last_ = 0;                 // [ns]
 };
 
-/// Writes a file from its beginning to its end, or goes on behind the last whole chunk of one that has no
-/// end.
+/// Writer of a file from its beginning to its end, or of the continuation after the last whole chunk of a
+/// file without an end.
 class Writer {
  public:
-  /// Begins a file that is empty; nothing is written before the first chunk or `flush`.
+  /// Begins an empty file; nothing is written before the first chunk or `flush`.
   Writer(FileDescriptor file, std::string_view library);
-  /// Goes on. Throws Error.
+  /// Continues a file. Throws Error.
   Writer(FileDescriptor file, Layout found);
 
   void add(const Metadata& metadata);
   void add(const Schema& schema);
   void add(const Channel& channel);
-  /// Throws Error, as all that follow, when the disk is full; then the file is as it was before.
+  /// Writes everything to the file. Throws Error if the disk is full, as do all below; the file is then as
+  /// before.
   void flush();
-  /// Writes and empties a chunk, with its index; nothing where it is empty.
+  /// Writes and empties a chunk, with its index; does nothing if it is empty.
   void write(Chunk& chunk);
-  /// The end of the data and the index, and all of it to the disk.
+  /// Writes the end of the data and the index, and flushes all to the disk.
   void finish();
 
  private:

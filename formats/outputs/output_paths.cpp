@@ -18,13 +18,13 @@ bool same_file(const std::optional<struct stat>& a, const std::optional<struct s
   return a && b && a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
-/// Whether `path` is `folder` or in it.
+/// True if `path` is `folder` or inside it.
 bool is_inside(const std::filesystem::path& path, const std::filesystem::path& folder) {
   const auto [end, ignored] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());
   return end == folder.end();
 }
 
-/// What stands there may be replaced.
+/// Throws Error unless an existing file may be replaced.
 void check_existing(const std::filesystem::path& file, OutputKind kind, std::optional<bool> force) {
   if (force.value_or(false) || ::access(file.c_str(), F_OK) != 0) return;
   const std::string elsewhere = std::string("write to another file, or ") +
@@ -38,7 +38,7 @@ void check_existing(const std::filesystem::path& file, OutputKind kind, std::opt
     throw Error("is a recording already, which could not be made again", file.string(), elsewhere);
 }
 
-/// What follows the last dot of a name, with it, in small letters; empty where that is no word.
+/// Ending of a name with its dot, in small letters; empty if it is no word.
 std::string ending_of(const std::filesystem::path& file) {
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
@@ -129,7 +129,7 @@ std::filesystem::path OutputPaths::add(const std::filesystem::path& path, Output
   return file;
 }
 
-/// What is written on the way to an output.
+/// Adds the intermediate file of an output.
 void OutputPaths::add_beside(const std::filesystem::path& path, const std::string& what) {
   Known beside = known(path, what + "'s unfinished part");
   refuse_inputs(beside);

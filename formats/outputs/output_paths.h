@@ -1,4 +1,4 @@
-// Where a run may write.
+// Paths that a run may write to.
 #pragma once
 
 #include <sys/stat.h>
@@ -13,28 +13,27 @@
 
 namespace palpate {
 
-/// Other programs go by the ending of a name: throws Error where it is a word and not one of the kind's, as
-/// `endings_of` has them. A name without one may be anything. `what`: "the report (--report)".
+/// Throws Error if the name's ending is a word that is not one of the kind's (`endings_of`), since other
+/// programs go by it. A name without ending is always accepted. `what`: "the report (--report)".
 void expect_ending(const std::filesystem::path& file, OutputKind kind, const std::string& what);
 
-/// Decides which paths a run may write, before its work begins. An output never takes the place of what the
-/// run reads, nor of another of its outputs, under whatever name (links). It takes the place of an existing
-/// file only where that is empty or an earlier output of the same kind (no recording that holds ticks), or
-/// where that is forced. Lives as
-/// long as the run: it holds pipes open, so that their readers wait.
+/// Checks the paths that a run writes to before its work begins. An output never replaces a file that the run
+/// reads, or another of its outputs, under whatever name (links). It replaces an existing file only if that
+/// is empty or an earlier output of the same kind (but no recording with ticks), or if forced. Lives as long
+/// as the run: it holds pipes open, so that their readers wait.
 class OutputPaths {
  public:
-  /// `force`: whether --force was given, with which existing files may be replaced whatever they are, unless
-  /// the run reads them; nothing where there is no such option. `keep`: none is replaced.
+  /// `force`: true if --force was given, which allows existing files of any kind to be replaced, unless the
+  /// run reads them; nullopt if there is no such option. `keep`: no file is replaced.
   explicit OutputPaths(std::optional<bool> force = {}, bool keep = false) : force_(force), keep_(keep) {}
 
-  /// A file or folder that the run reads, and what it is, "the script". One that is not there is nobody's
-  /// loss. Throws Error where an output would destroy it.
+  /// Adds a file or folder that the run reads; `what` names it, "the script". Files that do not exist are
+  /// ignored. Throws Error if an output would destroy it.
   void add_input(const std::filesystem::path& path, const std::string& what);
 
-  /// Returns where to write the output: of a symbolic link to a file, that file. Throws Error, with the
-  /// reason, where it may not or cannot be written, or has another format's ending. `option` says what asks
-  /// for it, "--record".
+  /// Returns the path to write the output to: of a symbolic link to a file, that file. Throws Error, with the
+  /// reason, if it may not or cannot be written, or has the ending of another format. `option` is the option
+  /// that requests it, "--record".
   std::filesystem::path add(const std::filesystem::path& path, OutputKind kind, const std::string& option);
 
  private:

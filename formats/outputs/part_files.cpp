@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t most_told = 8;  // missing parts
+constexpr std::size_t most_told = 8;  // missing parts in a message
 
 struct PartFile {
   std::filesystem::path path;
@@ -24,7 +24,7 @@ std::string name_of(std::int64_t number, std::int64_t parts) {
   return "part " + std::to_string(number) + " of " + std::to_string(parts);
 }
 
-/// Adds the parts of a model that lie in a folder.
+/// Adds the parts of a model in a folder.
 void find_in(const std::filesystem::path& folder, const std::filesystem::path& model,
              std::vector<std::filesystem::path>& found) {
   const std::string start = model.filename().string() + ".part-";

@@ -1,4 +1,4 @@
-// Parts of a bake: where they lie, and whether all are there.
+// Files of the parts of a bake.
 #pragma once
 
 #include <cstdint>
@@ -7,12 +7,12 @@
 
 namespace palpate {
 
-/// PATH.part-3-of-16, beside the model PATH.
+/// Path of a part, PATH.part-3-of-16, beside the model PATH.
 std::filesystem::path part_path(const std::filesystem::path& model, std::int64_t number, std::int64_t parts);
 
-/// The parts of a model, by their number: those in `named`, files and folders, or where it is empty those
-/// beside the model. Throws Error where there are none, one is missing, twice there or not finished, or not
-/// all are of one bake. Only reads journals.
+/// Parts of a model, by number: those in `named`, files and folders, or if it is empty those beside the
+/// model. Throws Error if there are none, one is missing, occurs twice or is unfinished, or if they are not
+/// of one bake. Reads only journals.
 std::vector<std::filesystem::path> find_parts(const std::filesystem::path& model,
                                               const std::vector<std::filesystem::path>& named);
 

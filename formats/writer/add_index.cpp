@@ -17,7 +17,7 @@
 namespace palpate {
 namespace {
 
-/// Where the file's HDF5 begins: at 0, 512 or twice as far, and so on.
+/// Offset of the file's HDF5 part: 0, 512 or a doubling of that.
 std::int64_t begin_of_hdf5(const FileDescriptor& file) {
   const std::int64_t bytes = file_size(file);
   for (std::int64_t at = 0; at < bytes; at = at == 0 ? 512 : 2 * at) {

@@ -1,15 +1,15 @@
-// The index of models that have lost it, or that another program has changed.
+// The index of models that lost it or were changed by another program.
 #pragma once
 
 #include <filesystem>
 
 namespace palpate {
 
-/// Writes the file anew, with the index in front of its HDF5 in place of what stands there. Throws Error
-/// where it is no model of this format version; then it is as it was.
+/// Rewrites the file with a new index in front of its HDF5 part. Throws Error if it is no model of this
+/// format version; the file is then unchanged.
 void add_index(const std::filesystem::path& model);
 
-/// Whether a file's index says what its HDF5 says. Throws Error where one of them cannot be read.
+/// True if a file's index matches its HDF5 part. Throws Error if one of them cannot be read.
 [[nodiscard]] bool is_index_right(const std::filesystem::path& model);
 
 }  // namespace palpate

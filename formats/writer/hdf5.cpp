@@ -8,8 +8,7 @@ namespace {
 
 constexpr hsize_t alignment = 4096;  // a page
 
-/// We close every file ourselves; the library's own exit handler crashes after a close that failed (full
-/// disk).
+/// All files are closed explicitly; the library's own exit handler crashes after a failed close (full disk).
 [[maybe_unused]] const herr_t no_exit_handler = H5dont_atexit();
 
 }  // namespace
@@ -64,7 +63,7 @@ Id access_properties(std::int64_t align_from) {
   if (align_from > 0) {
     H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
   } else {
-    H5Pset_small_data_block_size(access.get(), 0);  // small rows follow each other, too
+    H5Pset_small_data_block_size(access.get(), 0);  // small rows are adjacent, too
   }
   return access;
 }

@@ -22,20 +22,21 @@ class Id {
 
   [[nodiscard]] hid_t get() const noexcept { return id_; }
   [[nodiscard]] bool valid() const noexcept { return id_ >= 0; }
-  bool close() noexcept;  ///< false when the library failed, e.g. while it wrote what it still held
+  bool close() noexcept;  ///< returns false if the library failed, e.g. while writing buffered data
 
  private:
   hid_t id_ = H5I_INVALID_HID;
   Closer closer_ = nullptr;
 };
 
-/// The library's type for a NumberType.
+/// HDF5 type of a NumberType.
 hid_t type_of(std::string_view name);
 
-/// The deepest reason that the library gives for its last failure; the system's own words where it has any.
+/// Deepest reason that the library gives for its last failure; the system's message if there is one.
 std::string reason();
 
-/// For files of ours. Objects of at least `align_from` bytes (0: none) start at multiples of 4096 bytes.
+/// Access properties for our files. Objects of at least `align_from` bytes (0: none) start at multiples of
+/// 4096 bytes.
 Id access_properties(std::int64_t align_from = 0);
 
 /// Stops the library from printing its error stack while this lives.

@@ -69,7 +69,7 @@ File File::create(const std::filesystem::path& path, std::int64_t align_from) {
   H5Pset_userblock(creation.get(), static_cast<hsize_t>(index_bytes));
   File file(Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose), path);
   if (!file.file_.valid()) {
-    // Where the file vanishes while HDF5 makes it, HDF5 keeps the system's reason to itself.
+    // If the file vanishes while HDF5 creates it, HDF5 does not pass on the system's reason.
     if (::access(path.c_str(), F_OK) != 0)
       throw Error("cannot make the file: " + std::system_category().message(errno), path.string(),
                   "Something removed the file or its folder meanwhile");

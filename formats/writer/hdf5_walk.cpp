@@ -34,11 +34,11 @@ constexpr std::int64_t most_memory = std::int64_t{512} << 20;
 
 // ---- a driver of the library for descriptors: the child may open nothing ----
 
-/// What the library knows of an open file: it hands out the address of the first member.
+/// The library's handle of an open file, which it uses by the address of the first member.
 struct Opened {
   H5FD_t base{};
   int fd = -1;
-  haddr_t end = 0;        // of what is used
+  haddr_t end = 0;        // end of the used bytes
   haddr_t file_size = 0;  // [byte]
 };
 
@@ -50,7 +50,7 @@ const Opened& opened(const H5FD_t* file) {
   return *reinterpret_cast<const Opened*>(file);
 }
 
-/// `name` is the descriptor's number: the library hands on nothing else.
+/// Opens the descriptor whose number is `name`: the library passes nothing else on.
 H5FD_t* open_number(const char* name, unsigned /*flags*/, hid_t /*access*/, haddr_t /*most*/) {
   auto file = std::make_unique<Opened>();
   file->fd = std::stoi(name);
@@ -83,7 +83,7 @@ haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t /*type*/) {
   return opened(file).file_size;
 }
 
-/// What lies behind the end is read as zeros, as the library's own drivers do.
+/// Reads bytes; those beyond the end are zeros, as in the library's own drivers.
 herr_t read_bytes(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t at, std::size_t size,
                   void* into) {
   auto* bytes = static_cast<char*>(into);
@@ -99,13 +99,14 @@ herr_t read_bytes(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t
   return 0;
 }
 
-/// The library wants one.
+/// Does nothing; the library requires the function.
 herr_t write_nothing(H5FD_t* /*file*/, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t /*at*/,
                      std::size_t /*size*/, const void* /*bytes*/) {
   return -1;
 }
 
-/// Stays registered: as a file closes, the library gives the driver up before it calls its `close`.
+/// Identifier of the driver. It stays registered: when a file closes, the library releases the driver before
+/// calling its `close`.
 hid_t driver() {
   static const H5FD_class_t functions = [] {
     H5FD_class_t f{};
@@ -131,16 +132,16 @@ hid_t driver() {
   return registered;
 }
 
-/// Opens a file for the library to read. Not valid where the library refuses it.
+/// Opens a file for the library to read. The result is invalid if the library refuses it.
 Id open_descriptor(const FileDescriptor& file) {
   const Id access = access_properties();
   H5Pset_driver(access.get(), driver(), nullptr);
   return {H5Fopen(std::to_string(file.get()).c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose};
 }
 
-// ---- what the library sees ----
+// ---- objects in the file ----
 
-/// Groups, datasets and attributes, but none behind links.
+/// Walk over groups, datasets and attributes, except behind links.
 class Walk {
  public:
   explicit Walk(const FileDescriptor& bytes) : where_(bytes.path().string()) {
@@ -177,12 +178,12 @@ class Walk {
       if (opened.valid()) {
         describe(opened, member, depth + 1);
       } else {
-        objects_[member].type = other_type;  // that is not readable
+        objects_[member].type = other_type;  // not readable by us
       }
     }
   }
 
-  /// Names that the library lists, no more than there may be.
+  /// Names that the library lists, up to a limit.
   struct Names {
     std::vector<std::string> names{};
     void add(const char* name) { names.emplace_back(name); }
@@ -283,7 +284,7 @@ std::vector<std::byte> index_of(const FileDescriptor& file) {
                           .files = {file.get()},
                           .stop_at_signals = false};
   const auto look = [&, file_bytes = file_size(file)] {
-    H5PLset_loading_state(0);  // no code from elsewhere, whatever filter a file asks for
+    H5PLset_loading_state(0);  // load no filter plugins, whatever a file asks for
     return ChildResult{0, walked_index(file, file_bytes)};
   };
   return run_in_child(task, look).bytes;

@@ -1,4 +1,4 @@
-// The index of a file, by what the HDF5 library sees in it.
+// Index of a file as the HDF5 library reads it.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,13 @@
 
 namespace palpate::hdf5 {
 
-/// The index as it belongs at the beginning of a file that this program has written. Throws Error (where =
-/// the file) where it is not readable, or holds too much.
+/// Index for the beginning of a file that this program has written. Throws Error (where = the file) if it is
+/// not readable, or holds too much.
 std::vector<std::byte> index_of_own(const FileDescriptor& file);
 
-/// The index of a file that others may have made. The HDF5 library crashes on crafted files and may take all
-/// memory, so it looks at the file in a sealed child process with limits. What comes of it is believed as
-/// little as the index of a file: for Contents.
+/// Index of an untrusted file. The HDF5 library crashes on crafted files and may take all memory, so it reads
+/// the file in a sealed child process with limits. The result is as untrusted as an index from a file: pass
+/// it to Contents.
 std::vector<std::byte> index_of(const FileDescriptor& file);
 
 }  // namespace palpate::hdf5

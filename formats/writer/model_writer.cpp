@@ -28,7 +28,7 @@ namespace {
 
 constexpr std::array<std::int64_t, 2> written_version = {format_major, format_minor};
 constexpr std::int64_t metadata_allowance = 1 << 20;  // more than HDF5 needs around our datasets [byte]
-constexpr std::int64_t aligned_from = 1 << 16;  // of those that come last: smaller ones begin anywhere [byte]
+constexpr std::int64_t aligned_from = 1 << 16;  // datasets that come last: smaller ones begin anywhere [byte]
 constexpr std::size_t near_matrix = 0;          // in Impl::matrices, where there is one
 constexpr std::size_t values_at_once = 1 << 15;  // converted and written together
 
@@ -44,7 +44,7 @@ std::string checksum_of(const std::vector<T>& values) {
   return running.digits();
 }
 
-/// Stores one field of the model with its checksum.
+/// Writes one field of the model with its checksum.
 template <class T>
 void write_field(hdf5::File& file, const Field<T>& field, const Model& model, const Counts& counts) {
   const std::vector<T> values = field.take(model);
@@ -52,8 +52,8 @@ void write_field(hdf5::File& file, const Field<T>& field, const Model& model, co
   file.write_attribute(field.path, "xxh3", checksum_of(values));
 }
 
-/// Datasets that are known before the Green's functions, those of overlays, dynamics and [warp] where there
-/// are any.
+/// Datasets known before the Green's functions, including those of overlays, dynamics and [warp] if there are
+/// any.
 template <class Visitor>
 void for_each_known_field(const Model& model, Visitor&& visit) {
   for_each_body_field(model.mesh.element, visit);
@@ -78,7 +78,7 @@ void write_attributes(hdf5::File& file, const Model& model, const FileHeader& he
   });
 }
 
-/// What makes ParaView read the file as an unstructured grid.
+/// Writes the group by which ParaView reads the file as an unstructured grid.
 void write_vtk_view(hdf5::File& file) {
   constexpr std::array<std::int64_t, 2> vtkhdf_version = {1, 0};
   file.write_attribute("/VTKHDF", "Version", vtkhdf_version);
@@ -95,7 +95,7 @@ void write_vtk_view(hdf5::File& file) {
   file.make_link("/VTKHDF/CellData/material", "/material/of_element");
 }
 
-/// Checksum of the bytes [from, to) and what a running one had before.
+/// Adds the bytes [from, to) of a file to a running checksum.
 void add_bytes(RunningChecksum& running, const FileDescriptor& file, std::int64_t from, std::int64_t to) {
   std::vector<std::byte> buffer(std::size_t{1} << 20);
   while (from < to) {
@@ -106,12 +106,12 @@ void add_bytes(RunningChecksum& running, const FileDescriptor& file, std::int64_
   }
 }
 
-/// Bytes of the file from a place on.
+/// A range of bytes in the file.
 struct Gap {
   std::int64_t at, bytes;
 };
 
-/// Checksum of all bytes of the file but the gaps.
+/// Checksum of all bytes of the file except the gaps.
 std::string checksum_around(const FileDescriptor& file, std::vector<Gap> gaps) {
   std::sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.at < b.at; });
   RunningChecksum running;
@@ -124,7 +124,7 @@ std::string checksum_around(const FileDescriptor& file, std::vector<Gap> gaps) {
   return running.digits();
 }
 
-/// Columns of the lower triangle from `first` on, W W^T taken off.
+/// Columns of the lower triangle from `first` on, with W W^T subtracted.
 std::vector<double> without(const SmoothPart& smooth, std::int64_t first, std::int64_t order,
                             std::span<const double> packed) {
   std::vector<double> remainder(packed.begin(), packed.end());
@@ -137,23 +137,23 @@ std::vector<double> without(const SmoothPart& smooth, std::int64_t first, std::i
 }  // namespace
 
 struct ModelWriter::Impl {
-  /// A matrix that arrives in pieces: packed by columns, compressed by leaves of columns.
+  /// A matrix written in pieces: packed matrices by columns, compressed ones by leaves of columns.
   struct Streamed {
     const char* path;
     const char* name;
     NumberType scalar;
-    std::vector<std::int64_t> starts;  ///< [pieces + 1] first entry of each
+    std::vector<std::int64_t> starts;  ///< [pieces + 1] first entry of each piece
     std::shared_ptr<const SmoothPart> smooth;
     std::vector<bool> done{};  ///< [pieces]
-    PieceRange own{};          ///< pieces that the file has
+    PieceRange own{};          ///< pieces in this file
 
     [[nodiscard]] std::int64_t pieces() const { return std::ssize(starts) - 1; }
-    /// Entries of the file's pieces before a piece; of all of them.
+    /// Number of entries before a piece in this file; and in total.
     [[nodiscard]] std::int64_t entry(std::int64_t piece) const {
       return starts[static_cast<std::size_t>(piece)] - starts[static_cast<std::size_t>(own.first)];
     }
     [[nodiscard]] std::int64_t entries() const { return entry(own.end); }
-    /// Bytes before a piece; of all of them.
+    /// Number of bytes before a piece in this file; and in total.
     [[nodiscard]] std::int64_t byte(std::int64_t piece) const {
       return entry(piece) * static_cast<std::int64_t>(scalar.bytes);
     }
@@ -204,10 +204,10 @@ struct ModelWriter::Impl {
   std::int64_t order;
   std::vector<Streamed> matrices;
   JournalFrame frame;
-  std::optional<Journal> journal;                  // nothing where another process has it
+  std::optional<Journal> journal;                  // nullopt if another process has it
   std::function<void(const std::string&)> report;  // to the process that has it
   FileDescriptor data;
-  mutable std::mutex mutex;  // guards what is done and the journal
+  mutable std::mutex mutex;  // guards done and journal
 };
 
 ModelWriter::Impl::Streamed ModelWriter::Impl::packed_by_columns(const char* path, const char* name,
@@ -262,7 +262,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
   frame.part = part;
 }
 
-/// Resumes what is there, or starts.
+/// Resumes an earlier run, or starts.
 void ModelWriter::Impl::begin(const Model& model, Leftovers leftovers) {
   journal.emplace(with_suffix(path, ".progress"));
   if (leftovers == Leftovers::resume && resume()) return;
@@ -274,8 +274,8 @@ void ModelWriter::Impl::begin(const Model& model, Leftovers leftovers) {
   }
 }
 
-/// Proves that a reader will take the model; gives the key and an upper bound of the file's size. Before
-/// anything on the disk is touched, so that a mistake does not cost an earlier run's columns.
+/// Checks that a reader will accept the model; returns the key and an upper bound of the file's size. Runs
+/// before anything on the disk is touched, so that a mistake does not cost an earlier run's columns.
 JournalFrame ModelWriter::Impl::examine(const Model& model) {
   add_attributes(content, model, header, written_version);
   check_precision(model, header.precision, path.string());
@@ -294,7 +294,7 @@ JournalFrame ModelWriter::Impl::examine(const Model& model) {
   return expected;
 }
 
-/// Takes up what a killed run left; false when that is not the same model or was altered.
+/// Resumes a killed run; false if it was of another model or its file was altered.
 bool ModelWriter::Impl::resume() {
   const std::optional<JournalContents> left = journal->read();
   if (!left || left->frame.key != frame.key || left->frame.part != frame.part ||
@@ -317,7 +317,7 @@ bool ModelWriter::Impl::resume() {
   return true;
 }
 
-/// Those whose bytes still have their checksums.
+/// Ranges whose bytes still have their checksums.
 std::vector<JournalRange> ModelWriter::Impl::undamaged(const std::vector<JournalRange>& ranges) {
   std::vector<JournalRange> whole;
   for (const JournalRange& range : ranges) {
@@ -331,7 +331,7 @@ std::vector<JournalRange> ModelWriter::Impl::undamaged(const std::vector<Journal
   return whole;
 }
 
-/// Writes to the file of another process.
+/// Opens the file of another process for writing.
 void ModelWriter::Impl::join_in(const std::string& journal_text,
                                 std::function<void(const std::string&)> to_report) {
   const std::optional<JournalContents> begun = read_journal(journal_text);
@@ -356,8 +356,8 @@ void ModelWriter::Impl::join_in(const std::string& journal_text,
   report = std::move(to_report);
 }
 
-/// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
-/// journal says.
+/// True if a killed run's file is safe for the HDF5 library, and its packed matrices lie where the journal
+/// says.
 bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
   try {
     FileDescriptor file = open_file(partial, OpenMode::read);
@@ -389,7 +389,7 @@ void ModelWriter::Impl::start(const Model& model) {
   journal->write({frame, {}});
 }
 
-/// Everything but what `finish` brings.
+/// Writes everything except what `finish` adds.
 void ModelWriter::Impl::write_body(const Model& model) {
   const hdf5::Quiet quiet;
   std::int64_t smallest = streamed_bytes();
@@ -425,7 +425,7 @@ std::int64_t ModelWriter::Impl::streamed_bytes() const {
   return bytes;
 }
 
-/// Where a piece begins in the file.
+/// Position of a piece in the file.
 std::int64_t ModelWriter::Impl::place(std::size_t matrix, std::int64_t piece) const {
   return frame.packed_at[matrix] + matrices[matrix].byte(piece);
 }
@@ -453,7 +453,7 @@ void ModelWriter::Impl::mark_done(const JournalRange& range) {
   std::fill(begin, begin + range.count, true);
 }
 
-/// A piece is in the file.
+/// Records that a piece is in the file.
 void ModelWriter::Impl::record(const JournalRange& range) {
   const std::scoped_lock lock(mutex);
   if (journal) {
@@ -490,7 +490,7 @@ void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64
   record({static_cast<std::int64_t>(matrix), first, count, stored.digits()});
 }
 
-/// Copies the pieces that are not there.
+/// Copies the missing pieces of a part.
 void ModelWriter::Impl::add_part(const std::filesystem::path& from) {
   Journal held(with_suffix(from, ".progress"));
   const std::optional<JournalContents> left = held.read();
@@ -540,7 +540,7 @@ void ModelWriter::Impl::take_over(const FileDescriptor& file, std::int64_t origi
   record(range);
 }
 
-/// Read and not mapped, so that the file does not count as memory.
+/// Checksum of a matrix, read and not mapped, so that the file does not count as memory.
 std::string ModelWriter::Impl::streamed_checksum(std::size_t matrix) const {
   ChunkedChecksum running;
   const std::int64_t begin = frame.packed_at[matrix], end = place(matrix, matrices[matrix].pieces());
@@ -548,7 +548,7 @@ std::string ModelWriter::Impl::streamed_checksum(std::size_t matrix) const {
   return running.digits();
 }
 
-/// Ranks, certificate, bases and couplings.
+/// Writes ranks, certificate, bases and couplings.
 void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
   const HierarchicalMatrix& matrix = *extra.compressed;
   counts.set(Count::certified, std::ssize(matrix.certificate) / 6, "/greens/certificate");
@@ -631,7 +631,7 @@ std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, 
   exchange();
   try {
     if (ModelWriter::key_of(path, model, begun->precision) == journal->frame.key) return begun->precision;
-  } catch (const Error&) {  // it is of another model
+  } catch (const Error&) {  // of another model
   }
   exchange();
   return {};
