@@ -28,7 +28,7 @@ void ErrorBound::carry(std::span<const Index> nodes, std::span<const double> f) 
 double ErrorBound::work(std::span<const Index> nodes, std::span<const double> y) noexcept {
   const bool on_the_same = std::ranges::equal(nodes, std::span(sorted_nodes_).first(sorted_));
   if (on_the_same && stays_near_) return 0.0;
-  stays_near_ = stays_near_ && on_the_same;  // from now on others are sorted
+  stays_near_ = stays_near_ && on_the_same;  // from now on other nodes are sorted
   weigh(nodes, y, tried_);
   return deviations * std::sqrt(mean_square(tried_, carried_));
 }
@@ -58,7 +58,7 @@ double ErrorBound::mean_square(Index pair) const noexcept {
   return error * error / (dofs(row) * dofs(column));
 }
 
-/// The leaves that carry force, and the clusters above them.
+/// Finds the leaves that carry force, and the clusters above them.
 void ErrorBound::weigh(std::span<const Index> nodes, std::span<const double> f, Load& load) noexcept {
   const ClusterTree& tree = matrix_->tree;
   nodes = nodes.first(std::min(nodes.size(), places_.size()));
@@ -93,7 +93,7 @@ void ErrorBound::weigh(std::span<const Index> nodes, std::span<const double> f, 
   }
 }
 
-/// f^T Xi f of the forces on a leaf.
+/// f^T Xi f for the forces on a leaf.
 double ErrorBound::squared_of_leaf(Index leaf, std::span<const Index> places, std::span<const Index> nodes,
                                    std::span<const double> f) const noexcept {
   const ClusterTree& tree = matrix_->tree;
@@ -112,7 +112,7 @@ double ErrorBound::squared_of_leaf(Index leaf, std::span<const Index> places, st
         for (int b = 0; b < d; ++b) u += double{entry[b]} * f[at(std::int64_t{d} * j + b)];
         return u;
       };
-      double u = 0.0;  // the block is symmetric: what comes after i counts twice
+      double u = 0.0;  // the block is symmetric: nodes after i count twice
       for (const Index j : places.subspan(k + 1)) u += u_by(j);
       sum += f[at(std::int64_t{d} * i + a)] * (u_by(i) + 2.0 * u);
     }

@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-/// Both members of every pair see the other one; a pair of a cluster with itself once.
+/// Lists each pair at both of its clusters; a pair of a cluster with itself once.
 void list_partners(const std::vector<HierarchicalMatrix::Pair>& pairs, Index first, Index count,
                    std::vector<std::int64_t>& from, std::vector<HierarchicalMatrix::Pair>& partners) {
   const auto of = [first](Index cluster) { return static_cast<std::size_t>(cluster - first); };
@@ -18,7 +18,7 @@ void list_partners(const std::vector<HierarchicalMatrix::Pair>& pairs, Index fir
   std::partial_sum(from.begin(), from.end(), from.begin());
   partners.resize(static_cast<std::size_t>(from.back()));
   std::vector<std::int64_t> next = from;
-  // By columns: a cluster first is the row of its pairs with those before it, then the column of the others.
+  // By columns: a cluster is first the row of its pairs with earlier clusters, then the column of the others.
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const auto [row, column] = pairs[p];
     partners[static_cast<std::size_t>(next[of(row)]++)] = {column, static_cast<Index>(p)};

@@ -10,15 +10,15 @@
 
 namespace palpate {
 
-/// Ranks above it are refused: a tick keeps as many numbers a level on its stack.
+/// Largest rank; higher ones are refused, since a tick keeps that many numbers per level on its stack.
 inline constexpr Index most_rank = 128;
 
-/// More levels are refused: two million leaves.
+/// Largest number of levels, for two million leaves; more are refused.
 inline constexpr int most_levels = 21;
 
-/// The binary tree of clusters over N stored nodes. Level l has 2^l clusters; cluster i of it are the nodes
-/// [i N / 2^l, (i + 1) N / 2^l), so the number of levels and of nodes tell everything. Clusters are numbered
-/// level after level: the root is 0, the children of c are 2 c + 1 and 2 c + 2.
+/// Binary tree of clusters over N stored nodes. Level l has 2^l clusters; its cluster i holds the nodes
+/// [i N / 2^l, (i + 1) N / 2^l), so the numbers of levels and nodes determine the tree. Clusters are numbered
+/// level by level: the root is 0, the children of c are 2 c + 1 and 2 c + 2.
 struct ClusterTree {
   Index nodes = 0;
   int levels = 0;  ///< L: the leaves are on level L
@@ -31,7 +31,7 @@ struct ClusterTree {
     return 31 - __builtin_clz(static_cast<unsigned>(cluster) + 1U);
   }
   [[nodiscard]] static Index parent(Index cluster) noexcept { return (cluster - 1) / 2; }
-  /// Where the stored nodes of a cluster begin; those of the next one of its level begin where they end.
+  /// First stored node of a cluster; the next cluster of the level begins at its end.
   [[nodiscard]] Index begin(Index cluster) const noexcept {
     const int at = level(cluster);
     return static_cast<Index>(std::int64_t{cluster - first_of_level(at)} * nodes >> at);
@@ -40,7 +40,7 @@ struct ClusterTree {
     const int at = level(cluster);
     return static_cast<Index>((std::int64_t{cluster - first_of_level(at)} + 1) * nodes >> at);
   }
-  /// Leaf, as a cluster, that a stored node is in.
+  /// Leaf, as a cluster, that contains a stored node.
   [[nodiscard]] Index leaf_of(Index node) const noexcept {
     // The last i with i N / 2^L <= node, rounded down.
     const auto i = static_cast<Index>(((std::int64_t{node} + 1) * leaves() - 1) / nodes);
@@ -48,55 +48,56 @@ struct ClusterTree {
   }
 };
 
-/// The block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs where pairs of clusters that
-/// are far apart have low rank: with rows r of cluster a and columns c of cluster b, a far pair,
+/// Block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs, in which distant pairs of
+/// clusters have low rank. For rows r of cluster a and columns c of cluster b, a far pair,
 ///
-///   Xi(r, c) = V_a(r) S_ab V_b(c)^T,   V of a leaf is stored, V_parent = [V_child E_child, ...] is nested,
+///    Xi(r, c) = V_a(r) S_ab V_b(c)^T,   V of a leaf is stored, V_parent = [V_child E_child, ...] is nested.
 ///
-/// and pairs of leaves that are near are stored as they are. Each pair of dofs is in one near pair, or in one
-/// far pair. Read-only; the arrays are usually a mapping of the file. Copies share the data.
+/// Near pairs of leaves are stored in full. Each pair of dofs is in exactly one near or far pair. Read-only;
+/// the arrays are usually a mapping of the file. Copies share the data.
 struct HierarchicalMatrix {
   using Pair = std::array<Index, 2>;
 
-  int dimension = 3;  ///< d, dofs a node
+  int dimension = 3;  ///< d, dofs per node
   ClusterTree tree;
-  std::vector<Index> rank;      ///< [clusters] columns of V; 0 where no far pair needs one
+  std::vector<Index> rank;      ///< [clusters] columns of V; 0 if no far pair needs one
   std::vector<Pair> near_pair;  ///< leaves (row, column), row >= column; by columns
   std::vector<Pair> far_pair;   ///< clusters of one level, row > column; by columns
 
   std::shared_ptr<const float[]> basis;     ///< V of the leaves, one after the other, by rows [d m x rank]
-  std::shared_ptr<const float[]> transfer;  ///< E of the clusters but the root [rank x rank of the parent]
+  std::shared_ptr<const float[]> transfer;  ///< E of all clusters except the root [rank x rank of the parent]
   std::shared_ptr<const float[]> coupling;  ///< S of the far pairs [rank of row x rank of column] [m/N]
   std::shared_ptr<const float[]> near;      ///< entries of the near pairs by rows [m/N]
 
-  /// [far pairs] By how much each pair is off [-], about: Frobenius' norm of L_row^-1 (what it is to be -
-  /// what is stored) L_column^-T, with L L^T = Xi of each leaf, one after the other. See ErrorBound.
+  /// [far pairs] Approximate error of each pair [-]: the Frobenius norm of L_row^-1 (exact - stored)
+  /// L_column^-T, with L L^T = Xi of each leaf, one after the other. See ErrorBound.
   std::vector<double> pair_error;
 
-  double scale = 1.0;  ///< the matrix is this times what is stored
+  double scale = 1.0;  ///< factor on all stored entries
 
-  double tolerance = 0.0;  ///< most that forces of touches may be off, relative to the largest [-]
-  /// [rows x 6] What was measured: nodes of a touch, touches, their median, 99 % and worst force error, and
-  /// the largest share that a total force's error has of its ErrorBound.
+  double tolerance = 0.0;  ///< largest allowed force error of a touch, relative to the largest force [-]
+  /// [rows x 6] Measured errors: nodes of a touch, touches, median, 99 % and worst force error, and the
+  /// largest ratio of a total force's error to its ErrorBound.
   std::vector<double> certificate;
 
-  // What follows from the above: see `index`.
+  // Derived from the above by `index`.
   std::vector<std::int64_t> basis_at;      ///< [leaves + 1] first entry of each leaf's V
   std::vector<std::int64_t> transfer_at;   ///< [clusters + 1]
   std::vector<std::int64_t> coupling_at;   ///< [far pairs + 1]
   std::vector<std::int64_t> near_at;       ///< [near pairs + 1]
   std::vector<std::int64_t> partner_from;  ///< [clusters + 1] first of each cluster's partners
-  /// The other clusters of the far pairs of each cluster, ascending: (cluster, number of the pair).
+  /// Far partners of each cluster, ascending: (other cluster, number of the pair).
   std::vector<Pair> partner;
   std::vector<std::int64_t> near_from;  ///< [leaves + 1] as partner_from, of near pairs
   std::vector<Pair> neighbour;          ///< as partner, of near pairs
 
   [[nodiscard]] std::int64_t order() const noexcept { return std::int64_t{dimension} * tree.nodes; }
-  /// First near pair whose column is the leaf [0, leaves] or a later one: those of a leaf are side by side.
+  /// First near pair whose column is the leaf [0, leaves] or a later one: near pairs of one leaf are
+  /// adjacent.
   [[nodiscard]] std::int64_t first_near_pair(Index leaf) const noexcept;
-  /// Bytes of the four arrays.
+  /// Size of the four arrays [byte].
   [[nodiscard]] std::int64_t bytes() const noexcept;
-  /// Numbers the entries and lists the partners; once tree, ranks and pairs are there.
+  /// Fills the derived members, once tree, ranks and pairs are set.
   void index();
 };
 

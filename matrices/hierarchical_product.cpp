@@ -14,7 +14,7 @@ using Terms = std::array<double, std::size_t{most_rank}>;
 
 constexpr std::size_t levels_at_most = most_levels + 1;
 constexpr std::size_t columns_at_once = 256;  // of a row, sorted by leaves
-constexpr std::size_t leaves_at_once = 64;    // that carry force
+constexpr std::size_t leaves_at_once = 64;    // leaves that carry force
 constexpr std::size_t nodes_at_once = 256;    // of those leaves
 constexpr std::size_t terms_at_once = 16384;  // of those leaves and all above them: on the stack
 
@@ -34,7 +34,7 @@ void add(const float* a, double factor, double* sum, Index count) noexcept {
   for (Index k = 0; k < count; ++k) sum[k] += factor * static_cast<double>(a[k]);
 }
 
-/// A_p from of R rows A_p, side by side.
+/// Products of R rows A_p with `from`, computed side by side.
 template <std::size_t R>
 std::array<double, R> dots(const std::array<const float*, R>& A, const double* from, Index count) noexcept {
   std::array<double, R> sum{};
@@ -71,17 +71,17 @@ void add_transposed(const float* A, Index rows, Index columns, const double* fro
   for (Index i = 0; i < rows; ++i) add(A + std::int64_t{i} * columns, from[i], to, columns);
 }
 
-/// The matrix as seen while walking its tree.
+/// The matrix with the look-ups of a walk through its tree.
 struct Walk {
   const HierarchicalMatrix& matrix;
 
   [[nodiscard]] int levels() const noexcept { return matrix.tree.levels; }
   [[nodiscard]] Index rank(Index c) const noexcept { return matrix.rank[at(c)]; }
-  /// Cluster of a level that a leaf is in.
+  /// Cluster on a level that contains a leaf.
   [[nodiscard]] Index above(Index leaf, int level) const noexcept {
     return matrix.tree.first_of_level(level) + ((leaf - matrix.tree.first_leaf()) >> (levels() - level));
   }
-  /// V of a dof of a leaf.
+  /// Row of V for a dof of a leaf.
   [[nodiscard]] const float* basis(Index leaf, std::int64_t dof_in_leaf) const noexcept {
     return matrix.basis.get() + matrix.basis_at[at(leaf - matrix.tree.first_leaf())] +
            dof_in_leaf * rank(leaf);
@@ -89,7 +89,7 @@ struct Walk {
   [[nodiscard]] const float* transfer(Index c) const noexcept {
     return matrix.transfer.get() + matrix.transfer_at[at(c)];
   }
-  /// The far partners of a cluster.
+  /// Far partners of a cluster.
   [[nodiscard]] std::span<const Pair> partners(Index c) const noexcept {
     return {matrix.partner.data() + matrix.partner_from[at(c)],
             matrix.partner.data() + matrix.partner_from[at(c) + 1]};
@@ -98,7 +98,7 @@ struct Walk {
     const std::size_t i = at(leaf - matrix.tree.first_leaf());
     return {matrix.neighbour.data() + matrix.near_from[i], matrix.neighbour.data() + matrix.near_from[i + 1]};
   }
-  /// Number of the far pair of two clusters of a level, -1 where they are none.
+  /// Number of the far pair of two clusters of a level, -1 if they are none.
   [[nodiscard]] Index far_pair(Index a, Index b) const noexcept {
     return find(matrix.partner, matrix.partner_from[at(a)], matrix.partner_from[at(a) + 1], b);
   }
@@ -106,7 +106,7 @@ struct Walk {
     const std::size_t leaf = at(a - matrix.tree.first_leaf());
     return find(matrix.neighbour, matrix.near_from[leaf], matrix.near_from[leaf + 1], b);
   }
-  /// to += S_ab from, or S_ab^T where `a` is the column of the pair.
+  /// to += S_ab from, or S_ab^T from if `a` is the column of the pair.
   void couple(Index pair, Index a, Index b, const double* from, double* to) const noexcept {
     const float* S = matrix.coupling.get() + matrix.coupling_at[at(pair)];
     if (a > b) {
@@ -126,7 +126,7 @@ struct Walk {
   }
 };
 
-/// A block row, the columns of a leaf at a time.
+/// A block row, evaluated one leaf of columns at a time.
 template <int D>
 class BlockRow {
  public:
@@ -140,13 +140,13 @@ class BlockRow {
                   up_[at(highest_)][at(axis)].begin());
   }
 
-  /// Goes to a leaf of columns: least work where it is near the one before.
+  /// Moves on to a leaf of columns; cheapest if it is near the one before.
   void go(Index leaf) noexcept {
     near_ = walk_.near_pair(leaf_, leaf);
     if (near_ < 0) reach(leaf);
   }
 
-  /// The block at a column of the leaf; entry (i, j) goes to block[i * stride + j].
+  /// Evaluates the block at a column of the leaf; entry (i, j) goes to block[i * stride + j].
   void block(Index leaf, Index column, double* block, std::ptrdiff_t stride) const noexcept {
     const HierarchicalMatrix& m = walk_.matrix;
     const std::int64_t in_leaf = std::int64_t{D} * (column - m.tree.begin(leaf)),
@@ -172,7 +172,7 @@ class BlockRow {
   }
 
  private:
-  /// What the row and a cluster of columns have in common: what V of the columns is multiplied by.
+  /// Terms of the row for a cluster of columns, by which V of the columns is multiplied.
   struct Down {
     Index cluster = -1;
     std::array<Terms, D> terms;
@@ -184,7 +184,7 @@ class BlockRow {
     return all;
   }
 
-  /// Terms of a far leaf, from the lowest cluster that is on the way to the leaf before too.
+  /// Computes the terms of a far leaf, from the lowest cluster that is also above the leaf before.
   void reach(Index leaf) noexcept {
     int level = across_;
     if (level == 0 || down_[at(level)].cluster != walk_.above(leaf, level)) {
@@ -205,7 +205,7 @@ class BlockRow {
     for (++level; level <= walk_.levels(); ++level) descend(level, walk_.above(leaf, level));
   }
 
-  /// The row of V on all levels from the leaf's to `level`.
+  /// Computes the row of V on all levels from the leaf's up to `level`.
   void climb(int level) noexcept {
     for (; highest_ > level; --highest_) {
       const Index c = walk_.above(leaf_, highest_), parent = ClusterTree::parent(c);
@@ -242,13 +242,13 @@ class BlockRow {
   Walk walk_;
   Index leaf_, row_in_leaf_;
   int highest_;      // level that up_ reaches
-  int across_ = 0;   // level of the far pair of the leaf of columns, 0: there was none
-  Index near_ = -1;  // number of the near pair, -1 where they are far
+  int across_ = 0;   // level of the far pair of the leaf of columns; 0 if there was none yet
+  Index near_ = -1;  // number of the near pair, -1 if they are far
   std::array<std::array<Terms, D>, levels_at_most> up_;
   std::array<Down, levels_at_most> down_;
 };
 
-/// Columns by their leaves, ascending.
+/// Columns grouped by leaf, leaves ascending.
 class ColumnsOfLeaves {
  public:
   ColumnsOfLeaves(const ClusterTree& tree, std::span<const Index> columns) noexcept {
@@ -275,7 +275,7 @@ class ColumnsOfLeaves {
     Index first;  ///< one of its columns
   };
   [[nodiscard]] std::span<const Columns> leaves() const noexcept { return {leaves_.data(), count_}; }
-  /// Another column of the leaf, -1 after the last.
+  /// Next column of the same leaf, -1 after the last.
   [[nodiscard]] Index next(Index column) const noexcept { return next_[at(column)]; }
 
  private:
@@ -285,7 +285,7 @@ class ColumnsOfLeaves {
   std::size_t count_ = 0;
 };
 
-/// Forces on the nodes of some leaves, and what they do to other nodes.
+/// Forces on the nodes of some leaves, and the displacements they cause.
 template <int D>
 class FieldOfLeaves {
  public:
@@ -293,7 +293,7 @@ class FieldOfLeaves {
                 std::span<double> u) noexcept
       : walk_{matrix}, ranges_(ranges), u_(u) {}
 
-  /// False when there is no more room.
+  /// Adds the force on a node; false if the capacity is exhausted.
   bool take(Index node, const double* f) noexcept {
     if (nodes_ == nodes_at_once) return false;
     const Index leaf = walk_.matrix.tree.leaf_of(node);
@@ -335,7 +335,7 @@ class FieldOfLeaves {
     return strengths_.data() + strength_at_[at(level)][slot];
   }
 
-  /// Leaves ascending, sources by leaves.
+  /// Sorts leaves ascending and sources by leaf.
   void sort() noexcept {
     const auto leaves = active_[at(walk_.levels())].begin();
     std::sort(leaves, leaves + std::ptrdiff_t(leaves_));
@@ -351,7 +351,7 @@ class FieldOfLeaves {
     source_from_[leaves_] = k;
   }
 
-  /// The far field of each active cluster but the root: terms of V^T f.
+  /// Computes the far field V^T f of each active cluster except the root.
   void climb() noexcept {
     const int L = walk_.levels();
     count_[at(L)] = leaves_;
@@ -386,10 +386,10 @@ class FieldOfLeaves {
                        strength(level - 1, count - 1));
       }
     }
-    count_[0] = 0;  // the root is far from nothing
+    count_[0] = 0;  // the root has no far pairs
   }
 
-  /// Calls f(slot, pair) for the active clusters of a level among partners; both are ascending.
+  /// Calls f(slot, pair) for the partners that are active clusters of the level; both are ascending.
   template <class F>
   void for_each_active(std::span<const Pair> partners, int level, const F& f) noexcept {
     const auto& active = active_[at(level)];
@@ -401,7 +401,7 @@ class FieldOfLeaves {
     }
   }
 
-  /// `moved`: whether the parent's terms are not zero.
+  /// Adds the displacements in a cluster; `moved` is true if the parent's terms are not zero.
   void descend(Index c, int level, bool moved) noexcept {
     const ClusterTree& tree = walk_.matrix.tree;
     if (tree.begin(c) >= end_ || tree.end(c) <= first_) return;
@@ -425,7 +425,7 @@ class FieldOfLeaves {
     for_each_active(walk_.neighbours(c), level, [&](std::size_t slot, Index pair) { push(c, slot, pair); });
   }
 
-  /// The nodes of a leaf that are asked for: [first, second).
+  /// Requested nodes of a leaf: [first, second).
   [[nodiscard]] std::pair<Index, Index> asked(Index leaf) const noexcept {
     const ClusterTree& tree = walk_.matrix.tree;
     return {std::max(tree.begin(leaf), first_), std::min(tree.end(leaf), end_)};
@@ -443,7 +443,8 @@ class FieldOfLeaves {
     }
   }
 
-  /// u += rows of a near pair times the forces; some rows together, so that sums do not wait for each other.
+  /// u += rows of a near pair times the forces; several rows at once, so that the sums do not wait for each
+  /// other.
   template <std::size_t R>
   void add_rows(const float* rows, std::int64_t width, std::span<const Source> sources,
                 double* u) const noexcept {
@@ -457,7 +458,7 @@ class FieldOfLeaves {
     for (std::size_t r = 0; r < R; ++r) u[r] += walk_.matrix.scale * sum[r];
   }
 
-  /// By the forces on a near leaf.
+  /// Adds the displacement by the forces on a near leaf.
   void push(Index leaf, std::size_t slot, Index pair) noexcept {
     const HierarchicalMatrix& m = walk_.matrix;
     const Index other = active_[at(walk_.levels())][slot];
@@ -477,7 +478,7 @@ class FieldOfLeaves {
       for (; i < count; ++i) add_rows<1>(entries + (first + i) * width - before, width, sources, u + i);
       return;
     }
-    // Rows of the pair, or of a leaf with itself, are the columns that are asked for.
+    // Rows of the pair, or of a leaf with itself, are the requested columns.
     const std::int64_t width = width_of(leaf);
     for (const Source& s : sources)
       for (int axis = 0; axis < D; ++axis)
@@ -488,10 +489,10 @@ class FieldOfLeaves {
   Walk walk_;
   std::span<const NodeRange> ranges_;
   std::span<double> u_;
-  Index first_ = 0, end_ = 0;  // the range under way
+  Index first_ = 0, end_ = 0;  // the current range
   double* to_ = nullptr;       // its displacement
   std::size_t nodes_ = 0, leaves_ = 0;
-  std::size_t terms_ = 0;  // at most, of the leaves and all above them
+  std::size_t terms_ = 0;  // upper bound, over the leaves and all clusters above them
   std::array<Source, nodes_at_once> sources_;
   std::array<std::size_t, leaves_at_once + 1> source_from_;
   std::array<std::size_t, levels_at_most> count_;  // active clusters of a level

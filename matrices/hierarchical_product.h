@@ -1,4 +1,4 @@
-// What a tick asks of a matrix in nested low-rank form.
+// Rows and products of a matrix in nested low-rank form, for a tick.
 #pragma once
 
 #include <span>
@@ -8,13 +8,13 @@
 
 namespace palpate {
 
-/// As Greens::gather. Each far column costs its leaf's part of V, and each leaf of columns one way through
-/// the tree.
+/// Greens::gather for this form. Each far column costs its leaf's part of V, and each leaf of columns one
+/// pass through the tree.
 void gather_blocks(const HierarchicalMatrix& matrix, Index row, std::span<const Index> columns,
                    std::span<double> blocks) noexcept;
 
-/// As Greens::displacement of ranges of nodes: up the tree from the nodes that carry force, once for all
-/// ranges, across, and down to those that are asked for.
+/// Greens::displacement of ranges of nodes for this form: up the tree from the loaded nodes, once for all
+/// ranges, across the far pairs, and down to the requested nodes.
 void displace(const HierarchicalMatrix& matrix, std::span<const Index> nodes, std::span<const double> f,
               std::span<const NodeRange> ranges, std::span<double> u) noexcept;
 

@@ -77,7 +77,7 @@ std::vector<int> postorder(const std::vector<int>& parent) {
   return order;
 }
 
-/// Whether a supernode of so many columns may have this share of zeros among its entries: dense blocks are
+/// True if a supernode of so many columns may have this fraction of zeros among its entries: dense blocks are
 /// worth them while they are narrow.
 bool may_have_zeros(int columns, double share) noexcept {
   return columns <= 6 || (columns <= 16 && share < 0.6) || (columns <= 48 && share < 0.15) || share < 0.05;
@@ -85,7 +85,7 @@ bool may_have_zeros(int columns, double share) noexcept {
 
 }  // namespace
 
-/// Puts position_ and the rows' columns into postorder of the elimination tree, which it returns.
+/// Puts position_ and the rows' columns into postorder of the elimination tree; returns the tree.
 std::vector<int> SparseCholesky::postordered_tree(std::vector<std::vector<int>>& before) {
   const std::vector<int> parent = elimination_tree(before), order = postorder(parent);
   std::vector<int> now(order.size());
@@ -103,7 +103,7 @@ std::vector<int> SparseCholesky::postordered_tree(std::vector<std::vector<int>>&
   return moved_parent;
 }
 
-/// [n] Entries of each column of L, the diagonal included: each row's entries are a subtree.
+/// [n] Entries of each column of L, the diagonal included: the entries of each row form a subtree.
 std::vector<int> SparseCholesky::column_counts(const std::vector<std::vector<int>>& before,
                                                const std::vector<int>& parent) {
   std::vector<int> counts(before.size(), 1), seen(before.size(), -1);
@@ -119,7 +119,7 @@ std::vector<int> SparseCholesky::column_counts(const std::vector<std::vector<int
   return counts;
 }
 
-/// Columns whose rows are the same, and then supernodes with their parents as long as the zeros are few.
+/// Merges columns with the same rows, and then supernodes with their parents while zeros stay few.
 void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::vector<int>& counts) {
   supernodes_.clear();
   const int n = static_cast<int>(parent.size());
@@ -151,7 +151,7 @@ void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::
   supernodes_.assign(merged.rbegin(), merged.rend());
 }
 
-/// [n] The supernode of each column.
+/// [n] Supernode of each column.
 std::vector<int> SparseCholesky::supernode_of_column() const {
   std::vector<int> of_column(position_.size());
   for (std::size_t s = 0; s < supernodes_.size(); ++s)
@@ -159,7 +159,7 @@ std::vector<int> SparseCholesky::supernode_of_column() const {
   return of_column;
 }
 
-/// The rows of each supernode: those of A and those that its children leave.
+/// Finds the rows of each supernode: those of A and those of its children's updates.
 void SparseCholesky::find_rows(const std::vector<std::vector<int>>& before) {
   const std::vector<int> of_column = supernode_of_column();
   std::vector<std::vector<int>> rows(supernodes_.size());
@@ -204,7 +204,7 @@ void SparseCholesky::find_rows(const std::vector<std::vector<int>>& before) {
   }
 }
 
-/// Where each entry of A goes.
+/// Finds the place of each entry of A.
 void SparseCholesky::find_places(const Eigen::SparseMatrix<double>& A) {
   const std::vector<int> of_column = supernode_of_column();
   places_.clear();
@@ -225,7 +225,7 @@ void SparseCholesky::find_places(const Eigen::SparseMatrix<double>& A) {
   }
 }
 
-/// Takes the memory of what is left for parents at any moment.
+/// Reserves the memory for the updates that wait for their parents at any moment.
 void SparseCholesky::find_room() {
   std::vector<std::size_t> left(supernodes_.size(), 0);  // by the children of a supernode
   std::size_t now = 0, most = 0;
@@ -251,7 +251,7 @@ void SparseCholesky::analyse(const Eigen::SparseMatrix<double>& A) {
   find_room();
 }
 
-/// Adds what a child has left to the columns of its parent, and to what that leaves.
+/// Adds a child's update to the columns of its parent and to the parent's update.
 void SparseCholesky::take(const Supernode& child, const double* left, Supernode& into,
                           double* update) noexcept {
   const int n = child.below();
@@ -266,7 +266,7 @@ void SparseCholesky::take(const Supernode& child, const double* left, Supernode&
   }
 }
 
-/// Factorises the columns of a supernode; what they leave is taken off `update`.
+/// Factorises the columns of a supernode and subtracts their contribution from `update`.
 bool SparseCholesky::eliminate(const Supernode& supernode, double* update) {
   double* panel = values_.data() + supernode.values_at;
   const int rows = supernode.rows, columns = supernode.columns, below = supernode.below();

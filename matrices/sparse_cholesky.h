@@ -1,4 +1,4 @@
-// Cholesky factors of sparse matrices of one pattern.
+// Cholesky factors of sparse matrices with a common pattern.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,29 +9,29 @@
 
 namespace palpate {
 
-/// P A P^T = L L^T of symmetric positive definite matrices, one after the other, whose pattern stays: the
-/// multifrontal method (Duff & Reid 1983; Liu 1992) in an order of approximate minimum degree (Amestoy, Davis
-/// & Duff 1996). Columns of L with nearly the same rows are supernodes, stored and computed as dense blocks.
+/// P A P^T = L L^T of symmetric positive definite matrices, one after the other, with a fixed pattern: the
+/// multifrontal method (Duff & Reid 1983; Liu 1992) in an approximate minimum degree order (Amestoy, Davis &
+/// Duff 1996). Columns of L with nearly the same rows are supernodes, stored and computed as dense blocks.
 class SparseCholesky {
  public:
-  /// Finds the order of elimination and where each entry of L lies. Of A the lower triangle is read.
+  /// Finds the elimination order and the place of each entry of L. Reads the lower triangle of A.
   void analyse(const Eigen::SparseMatrix<double>& A);
 
-  /// Factorises a matrix of the pattern that was analysed, compressed as it was. False when it is not
-  /// positive definite or not finite: there is no factor then.
+  /// Factorises a compressed matrix with the analysed pattern. Returns false, without a factor, if it is not
+  /// positive definite or not finite.
   bool factorise(const Eigen::SparseMatrix<double>& A);
 
-  /// A^-1 b [n x columns] of the last matrix that was factorised.
+  /// A^-1 b [n x columns] for the matrix factorised last.
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;
-  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;  ///< of one column
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;  ///< for one column
 
-  [[nodiscard]] std::int64_t entries() const noexcept { return std::ssize(values_); }  ///< stored, of L
+  [[nodiscard]] std::int64_t entries() const noexcept { return std::ssize(values_); }  ///< stored in L
 
  private:
-  /// Columns of L, dense: its own columns first among its rows.
+  /// Dense block of columns of L; the first of its rows are its own columns.
   struct Supernode {
     int first = 0, columns = 0;  // by order of elimination
-    int parent = -1;             // supernode that takes what this one leaves
+    int parent = -1;             // supernode that receives this one's update
     std::size_t rows_at = 0;     // in rows_ and in_parent_
     int rows = 0;
     std::size_t values_at = 0;  // [rows x columns] by columns
@@ -55,10 +55,10 @@ class SparseCholesky {
   std::vector<int> position_;  // [n] in the order of elimination
   std::vector<Supernode> supernodes_;
   std::vector<int> rows_;               // by supernode, ascending
-  std::vector<int> in_parent_;          // row of the parent that each row below is
+  std::vector<int> in_parent_;          // row of the parent for each row below the block
   std::vector<std::ptrdiff_t> places_;  // [entries of A] in values_; -1 above the diagonal
   std::vector<double> values_;
-  std::vector<double> stack_;  // what supernodes leave for their parents, [below x below] each
+  std::vector<double> stack_;  // updates from supernodes to their parents, [below x below] each
 };
 
 }  // namespace palpate
