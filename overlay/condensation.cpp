@@ -16,7 +16,7 @@ std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-/// Stiffness of the local elements. Parts of a linear simplex that are one the other's translate have the
+/// Stiffness of the local elements. Parts of a linear simplex that are translates of each other have the
 /// same.
 class ElementStiffness {
  public:
@@ -50,7 +50,7 @@ class ElementStiffness {
   ElementMatrix K_;
 };
 
-/// Adds to a block of K_L what an element couples two local nodes by.
+/// Adds an element's coupling of two local nodes to a block of K_L.
 void add_local(const PatchLayers& layers, Index row_node, Index column_node, const auto& part,
                MatrixXd& block) {
   const Eigen::Index d = part.rows();
@@ -63,7 +63,7 @@ void add_local(const PatchLayers& layers, Index row_node, Index column_node, con
   }
 }
 
-/// Adds the same to a block of K_LG, through the body's shape functions at the second node.
+/// Adds that coupling to a block of K_LG, through the body's shape functions at the second node.
 void add_to_body(const PatchLayers& layers, const Rows& shape, Index row_node, Index column_node,
                  const auto& part, MatrixXd& block) {
   const Eigen::Index d = part.rows();

@@ -1,4 +1,4 @@
-// A patch's fine mesh, condensed onto the body's nodes and its own surface.
+// Static condensation of a patch's fine mesh onto the body's nodes and its own surface.
 #pragma once
 
 #include "formats/condensed_patch.h"
@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// Eliminates the free local dofs layer by layer of nodes, from the deepest to the surface: a layer has
-/// common elements with the next ones only. Throws Error when K_L is not positive definite.
+/// Condenses a patch: eliminates its free local dofs layer by layer of nodes, from the deepest to the
+/// surface; a layer shares elements with adjacent layers only. Throws Error if K_L is not positive definite.
 CondensedPatch condense(const Model& model, const PatchMesh& patch);
 
 }  // namespace palpate

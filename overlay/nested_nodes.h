@@ -1,4 +1,4 @@
-// Nodes of finer elements that are nested in those of the body.
+// Nodes of finer elements nested in the body's elements.
 #pragma once
 
 #include <map>
@@ -10,14 +10,14 @@
 
 namespace palpate {
 
-/// What a node of a finer element is known by in all elements that have it: corners of the body's elements
+/// Key of a node of a finer element, the same in all elements that contain it: corners of the body's elements
 /// and their weights (Subdivision::Node), in the order of the corners.
 using NodeKey = std::vector<std::pair<Index, int>>;
 
 NodeKey key_of(const Subdivision::Node& node, std::span<const Index> corners);
 
 /// Elements of one kind, each cut into r^d. Simplices rank their corners by node number, so that neighbours
-/// fit.
+/// match.
 class Subdivisions {
  public:
   Subdivisions(ElementType type, int r) : type_(type), r_(r) {}
@@ -25,7 +25,7 @@ class Subdivisions {
   [[nodiscard]] ElementType type() const noexcept { return type_; }
   [[nodiscard]] int refinement() const noexcept { return r_; }
 
-  /// The subdivision of the element with these corners; the reference stays valid.
+  /// Subdivision of the element with these corners; the reference stays valid.
   const Subdivision& of(std::span<const Index> corners);
 
  private:

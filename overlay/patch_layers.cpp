@@ -33,7 +33,7 @@ PatchLayers::PatchLayers(const PatchMesh& patch, int dimension, const std::vecto
     add_layer(reached, patch, d);
     reached = next_to(patch);
   }
-  for (std::size_t node = 0; node < layer_of_.size(); ++node) {  // those that no surface is near
+  for (std::size_t node = 0; node < layer_of_.size(); ++node) {  // nodes not connected to the surface
     if (layer_of_[node] == unreached) reached.push_back(static_cast<Index>(node));
   }
   if (!reached.empty()) add_layer(reached, patch, d);
@@ -50,7 +50,7 @@ void PatchLayers::add_layer(const std::vector<Index>& nodes, const PatchMesh& pa
   sizes_.push_back(size);
 }
 
-/// Nodes that have an element in common with the last layer.
+/// Nodes that share an element with the last layer and have no layer yet.
 std::vector<Index> PatchLayers::next_to(const PatchMesh& patch) const {
   std::vector<Index> found;
   for (Index e = 0; e < patch.local.elements(); ++e) {
@@ -89,7 +89,7 @@ bool eliminate(LayeredStiffness& K, MatrixXd& G) {
 }
 
 SurfaceLayer surface_layer(const LayeredStiffness& K) {
-  // The surface's layer is left with K_L's Schur complement on it, whose inverse is the block of K_L^-1.
+  // K.diagonal[0] is K_L's Schur complement on the surface's layer; its inverse is that block of K_L^-1.
   const Eigen::Index size = K.diagonal[0].rows();
   const auto L = K.diagonal[0].triangularView<Eigen::Lower>();
   MatrixXd inverse = MatrixXd::Identity(size, size);

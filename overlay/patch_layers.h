@@ -1,4 +1,4 @@
-// The free dofs of a patch's fine mesh in layers, and their elimination.
+// Layers of the free dofs of a patch's fine mesh, and their elimination.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 namespace palpate {
 
 /// Free local nodes by their distance from the surface, in elements: nodes of a layer share elements with the
-/// layers beside it only.
+/// adjacent layers only.
 class PatchLayers {
  public:
   /// `surface`: local nodes on the body's surface.
@@ -19,9 +19,9 @@ class PatchLayers {
 
   [[nodiscard]] int count() const { return static_cast<int>(sizes_.size()); }
   [[nodiscard]] Eigen::Index size(int layer) const { return sizes_[layer]; }  ///< dofs of a layer
-  /// Layer of a local node, negative where it has none.
+  /// Layer of a local node, negative if it has none.
   [[nodiscard]] int layer_of(Index node) const { return layer_of_[static_cast<std::size_t>(node)]; }
-  /// Place of a local dof in its layer, -1 when it is not free.
+  /// Place of a local dof in its layer, -1 if it is not free.
   [[nodiscard]] Index place_of(std::size_t dof) const { return first_dof_[dof]; }
 
  private:
@@ -35,7 +35,7 @@ class PatchLayers {
   std::vector<Eigen::Index> sizes_;
 };
 
-/// K_L, which is block tridiagonal, and columns beside it: K_LG first.
+/// K_L, which is block tridiagonal, and columns beside it, K_LG first.
 struct LayeredStiffness {
   LayeredStiffness(const PatchLayers& layers, Eigen::Index columns);
 
@@ -45,18 +45,18 @@ struct LayeredStiffness {
 };
 
 /// Eliminates layer by layer, from the deepest to the surface, and adds C^T K_L^-1 C of the columns C to the
-/// lower triangle of `G`. What is left has factors L_k on the diagonal, and L_k^-1 in front of the rest.
-/// False when K_L is not positive definite.
+/// lower triangle of `G`. Leaves factors L_k on the diagonal, and L_k^-1 multiplied into the rest. Returns
+/// false if K_L is not positive definite.
 [[nodiscard]] bool eliminate(LayeredStiffness& K, Eigen::MatrixXd& G);
 
-/// At the surface's layer, after `eliminate`.
+/// Result at the surface's layer, after `eliminate`.
 struct SurfaceLayer {
   Eigen::MatrixXd compliance;  ///< K_L^-1
   Eigen::MatrixXd columns;     ///< K_L^-1 C
 };
 [[nodiscard]] SurfaceLayer surface_layer(const LayeredStiffness& K);
 
-/// Fills T and the compliance of the patch's surface, whose nodes `result` has.
+/// Fills T and the compliance of the patch's surface; `result` already has the surface's nodes.
 void put_surface(const PatchLayers& layers, const SurfaceLayer& surface,
                  const Eigen::SparseMatrix<double, Eigen::RowMajor>& shape, Eigen::Index dimension,
                  CondensedPatch& result);

@@ -16,9 +16,9 @@
 namespace palpate {
 namespace {
 
-constexpr double no_part = 1e-12;  // of a shape function
+constexpr double no_part = 1e-12;  // value of a shape function that counts as zero
 
-/// A side of an element of the patch that no other element of the patch has.
+/// A side of a patch element that no other patch element has.
 struct OuterSide {
   std::size_t number;  // among the element's sides
   unsigned corners;    // bit k: the element's corner k is on it
@@ -101,7 +101,7 @@ class Builder {
     std::vector<Index> local;  // numbers of the subdivision's nodes in the local mesh
     for (const Subdivision::Node& node : parts.nodes) {
       const Index number = find_node(node, corners, nodes);
-      unsigned bits = 0;  // of the corners that have a part in it
+      unsigned bits = 0;  // of the corners with a weight
       for (std::size_t k = 0; k < corners.size(); ++k) bits |= node.weights[k] > 0 ? 1U << k : 0U;
       local.push_back(number);
       for (const OuterSide& side : sides) {
@@ -129,7 +129,7 @@ class Builder {
     Vec3 position = Vec3::Zero();
     Vec3 rest = Vec3::Zero();
     Index coincident = -1;       // node of the body
-    unsigned zero = all_axes();  // held where all that have a part in it are
+    unsigned zero = all_axes();  // axes along which all contributing nodes are held
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const double part = N[static_cast<Eigen::Index>(k)];
       if (std::abs(part) < no_part) continue;

@@ -1,4 +1,4 @@
-// The fine mesh of an overlay: some elements of the body, each cut into smaller ones.
+// Fine mesh of an overlay: some elements of the body, each cut into smaller ones.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -25,43 +25,43 @@ class ElementsAtNodes {
   std::vector<Index> elements_;  // ascending at each node
 };
 
-/// The elements round some mesh nodes, ascending: those at the nodes, and in each further ring those at the
+/// Elements around some mesh nodes, ascending: those at the nodes, and for each further ring those at the
 /// nodes of the ring before.
 std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> nodes,
                                int rings);
 
-/// Nodes of some elements, each once, ascending.
+/// Nodes of some elements, without duplicates, ascending.
 std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements);
 
 /// A patch of elements and the mesh nested in it.
 struct PatchMesh {
-  std::vector<Index> elements;  ///< of the body, ascending
+  std::vector<Index> elements;  ///< elements of the body, ascending
   std::vector<Index>
       nodes;   ///< [g] mesh nodes of those elements that are not held along every axis, ascending
   Mesh local;  ///< the fine mesh
-  std::vector<Index> body_node;         ///< [local nodes] node of the body where each is, -1 where none is
+  std::vector<Index> body_node;         ///< [local nodes] coincident node of the body, -1 if there is none
   std::vector<Vec3> rest_displacement;  ///< [local nodes] u0 there, by the body's shape functions [m]
-  std::vector<Index> parent;            ///< [local elements] element of the body that each is a part of
+  std::vector<Index> parent;            ///< [local elements] element of the body that contains it
   std::vector<Index> surface;  ///< [simplices * d] local nodes on the body's surface, as Model::surface
-  /// [local nodes x g] the body's shape functions of `nodes` at the local nodes: u_G there is `shape` u_G.
+  /// [local nodes x g] the body's shape functions of `nodes` at the local nodes: there u_G is `shape` u_G.
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape;
-  /// [d * local nodes] number of each local dof among the free ones, -1 where u_L = 0: on the border Γ^GL to
-  /// the rest of the body, where a node coincides with one of the body's, and where the body is held
-  /// (theory.md section 4).
+  /// [d * local nodes] number of each local dof among the free ones, -1 if u_L = 0: on the border Γ^GL to the
+  /// rest of the body, at nodes that coincide with the body's, and where the body is held (theory.md section
+  /// 4).
   std::vector<Index> free_dof;
   Index free_dofs = 0;
-  std::map<NodeKey, Index> node_of_key;  ///< every local node
+  std::map<NodeKey, Index> node_of_key;  ///< keys of all local nodes
 };
 
 /// [m] local nodes on the body's surface, ascending.
 std::vector<Index> surface_nodes(const PatchMesh& patch);
 
-/// The body's shape functions by dofs, without those along which the body's nodes are held: u_G of all local
-/// dofs [d local nodes x d g] by u_G of the patch's nodes.
+/// The body's shape functions by dofs, without the dofs along which its nodes are held: maps u_G of the
+/// patch's nodes [d g] to all local dofs [d local nodes]. [d local nodes x d g]
 Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, const PatchMesh& patch);
 
-/// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,
-/// or when there is none. Subdivisions that are kept from patch to patch need not be made again.
+/// Cuts each of the elements into r^d. Throws Error unless r >= 2, if an element is not one of the model's,
+/// or if there is none. `cuts` keeps subdivisions from patch to patch.
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,
                           std::vector<Index> elements);
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r);

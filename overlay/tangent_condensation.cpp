@@ -7,7 +7,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-/// Adds an entry of K to where it belongs.
+/// Adds entries of K to the blocks of the condensation.
 class Entries {
  public:
   Entries(const PatchLayers& layers, const Rows& shape, Eigen::Index dimension, LayeredStiffness& K,

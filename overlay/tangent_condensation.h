@@ -1,4 +1,4 @@
-// A patch's fine mesh by the tangent of a law that is not linear, condensed.
+// Condensation of a patch's fine mesh by the tangent of a nonlinear law.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,15 +9,15 @@
 
 namespace palpate {
 
-/// Condenses a patch as `condense` does, by any symmetric stiffness K of its local dofs, and forces f on the
-/// free ones beside it (docs/overlays.md).
+/// Condenses a patch as `condense` does, for any symmetric stiffness K of its local dofs, together with
+/// forces f on the free ones (docs/overlays.md).
 class TangentCondensation {
  public:
-  /// `patch` must live as long.
+  /// `patch` must outlive this.
   TangentCondensation(const Model& model, const PatchMesh& patch);
 
-  /// `K` [d local nodes x d local nodes]: its lower triangle. `f` [free local dofs]. False when K_L is not
-  /// positive definite: then there is nothing to ask for.
+  /// `K` [d local nodes x d local nodes]: its lower triangle. `f` [free local dofs]. Returns false if K_L is
+  /// not positive definite: the members below are then not valid.
   [[nodiscard]] bool set(const Eigen::SparseMatrix<double>& K, const Eigen::VectorXd& f);
 
   /// N^T K N [d g x d g] [N/m]: the stiffness of the body's own nodes Q in the patch.
@@ -28,7 +28,7 @@ class TangentCondensation {
   [[nodiscard]] const Eigen::VectorXd& forces_on_body() const noexcept { return forces_on_body_; }
   /// K_L^-1 (f - K_LG u_Q) [free local dofs] [m].
   [[nodiscard]] Eigen::VectorXd local_displacement(const Eigen::VectorXd& u_Q) const;
-  /// All of it on the surface; and K_L^-1 f there [d m] [m].
+  /// Condensed patch with its surface; `by_forces` gets K_L^-1 f there [d m] [m].
   [[nodiscard]] CondensedPatch condensed(Eigen::VectorXd& by_forces) const;
 
   /// The body's shape functions by dofs, N [d local nodes x d g].
