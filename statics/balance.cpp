@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// Newton's steps on one body.
+/// Newton steps for one body.
 class Balance {
  public:
   Balance(const LiveBody& body, const Eigen::VectorXd& load, std::span<const Mat3> plastic)
@@ -22,7 +22,7 @@ class Balance {
     stiffness_ = mu * std::cbrt(volume * volume);
   }
 
-  /// Energy of the body in its loads [J]; fills the forces left on free dofs.
+  /// Energy of the body under its loads [J]; fills the residual forces on free dofs.
   double look(const Eigen::VectorXd& x, Eigen::VectorXd& left, Index& inverted) {
     const ForceSums sums = internal_forces(body_, x, plastic_, forces_);
     inverted = sums.inverted;
@@ -36,7 +36,7 @@ class Balance {
   bool direction(const Eigen::VectorXd& x, const Eigen::VectorXd& left, Eigen::VectorXd& step) {
     for (const TangentKind kind : {TangentKind::exact, TangentKind::positive}) {
       assemble_tangent(body_, x, plastic_, kind, K_);
-      if (kind == TangentKind::positive) {  // what is clamped may be singular
+      if (kind == TangentKind::positive) {  // the clamped tangent may be singular
         for (const Index place : body_.pattern().diagonal()) K_.valuePtr()[place] *= 1.0 + 1e-8;
       }
       if (solver_.set(K_) && solver_.solve(left, step)) return true;
@@ -44,7 +44,7 @@ class Balance {
     return false;
   }
 
-  /// Forces left, of the largest norm of forces in the way; what is rounding counts as none.
+  /// Norm of the residual forces, relative to the largest norm of forces so far; 0 if it is rounding.
   [[nodiscard]] double share_of(const Eigen::VectorXd& left) const noexcept {
     const double rounding = 1e-13 * stiffness_ * std::sqrt(static_cast<double>(left.size()));
     return left.norm() > rounding ? left.norm() / std::max(largest_, load_.norm()) : 0.0;
@@ -81,7 +81,7 @@ BalanceReport find_balance(const LiveBody& body, const Eigen::VectorXd& load, st
       for (Index free = 0; free < body.free_dofs(); ++free)
         tried[body.dof_of_free()[free]] += share * step[free];
       const double there = newton.look(tried, left_there, report.inverted);
-      // Near the end rounding hides the energy, and the forces tell.
+      // Near the end rounding hides the energy, and the forces decide.
       is_lower = there <= energy - 1e-4 * share * slope || left_there.norm() < 0.5 * before;
       if (is_lower) energy = there;
     }

@@ -31,8 +31,7 @@ Mat3 strain_tensor(const std::array<double, 6>& strain) {
   return tensor;
 }
 
-/// The loads of a file without the forces that stand there for initial strain, which the laws know by
-/// themselves.
+/// Loads of a file without the forces that represent initial strain, which the laws include themselves.
 std::vector<Vec3> loads_alone(const Model& model) {
   std::vector<Vec3> loads = model.rest_force;
   if (loads.empty()) return loads;
@@ -70,7 +69,7 @@ LiveBody::LiveBody(LiveInput input, const LiveOptions& options)
   for (const Material& material : input_.materials) {
     constants_.push_back(law_constants(material, input_.analysis));
     Mat3& strain = initial_strain_.emplace_back(strain_tensor(material.initial_strain));
-    if (input_.analysis == Analysis::plane_stress) strain(2, 2) = 0.0;  // is free
+    if (input_.analysis == Analysis::plane_stress) strain(2, 2) = 0.0;  // free in plane stress
   }
   find_points();
   find_loads();

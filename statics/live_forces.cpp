@@ -10,7 +10,7 @@ namespace {
 
 using NodeColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_element_nodes>;
 
-/// Positions of an element's nodes relative to its first: without loss far from the origin.
+/// Positions of an element's nodes relative to its first, without loss of digits far from the origin.
 NodeColumns relative_positions(const LiveBody& body, const Eigen::VectorXd& x, Index element) noexcept {
   const std::span<const Index> nodes = body.mesh().element_nodes(element);
   const Eigen::Index d = body.dimension();
@@ -34,7 +34,7 @@ Mat3 relaxed_strain(const LiveBody& body, std::span<const Mat3> plastic, Index e
   return plastic.empty() ? body.initial_strain(element) : Mat3(body.initial_strain(element) + plastic[point]);
 }
 
-/// The stretched spring: from a to b, and how long it is.
+/// Deformed spring: direction from a to b, and length.
 struct SpringState {
   Vec3 direction;
   double length;

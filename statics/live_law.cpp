@@ -14,7 +14,7 @@ namespace {
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 
-constexpr double least_volume = 0.1;  // J below which the neo-Hookean law is another
+constexpr double least_volume = 0.1;  // J below which the neo-Hookean law is replaced by its continuation
 
 Eigen::Map<const Vector9> as_vector(const Mat3& A) noexcept {
   return Eigen::Map<const Vector9>(A.data());
@@ -44,8 +44,8 @@ Mat3 rotation_of(LiveLaw law, const LawConstants& c, const Mat3& F) noexcept {
   return c.is_plane ? nearest_rotation_in_plane(F) : nearest_rotation(F);
 }
 
-/// tr(S) I - S: turns the axial part of a change of F into the rotation that it makes. Kept away from
-/// singular.
+/// tr(S) I - S: its inverse maps the axial part of a change of F to the rotation that it causes. Kept away
+/// from singular.
 Mat3 turning(const Mat3& S) noexcept {
   Mat3 G = S.trace() * Mat3::Identity() - S;
   const double size = S.norm();
@@ -57,7 +57,7 @@ Mat3 turning(const Mat3& S) noexcept {
 
 struct Corotated {
   Mat3 R, S, sigma, inverse_turning;
-  Vec3 couple;  // keeps moments in balance where sigma and S have other axes
+  Vec3 couple;  // balances moments if the axes of sigma and S differ
 };
 
 Corotated corotate(const LawConstants& c, const Mat3& F, const Mat3& relaxed) noexcept {
@@ -86,14 +86,14 @@ PointTangent corotational_tangent(const LawConstants& c, const Mat3& F, const Ma
   return C;
 }
 
-/// The part of the turning is clamped so that no change of F lowers the energy: 2 mu |dF|^2 is at least
-/// mu |axial(R^T dF)|^2.
+/// The rotational part is clamped so that no change of F lowers the energy: 2 mu |dF|^2 is at least mu
+/// |axial(R^T dF)|^2.
 PointTangent positive_corotational_tangent(const LawConstants& c, const Mat3& F,
                                            const Mat3& relaxed) noexcept {
   const Mat3 R = rotation_of(LiveLaw::corotational, c, F), S = sym(R.transpose() * F);
   const double stress = 2.0 * c.mu - c.lambda * (S - Mat3::Identity() - relaxed).trace();
-  // By rows, as no other source has it: of two solvers of one type, this one with fused multiply-add, the
-  // linker would keep one for both.
+  // RowMajor because no other source has it: of two equal solver types, one of them compiled with fused
+  // multiply-add, the linker would keep one for both.
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> eigen;
   eigen.computeDirect(S.trace() * Mat3::Identity() - S);
   const Vec3 share = eigen.eigenvalues().unaryExpr([&](double g) {
@@ -108,7 +108,7 @@ PointTangent positive_corotational_tangent(const LawConstants& c, const Mat3& F,
   return C;
 }
 
-/// Q sigma with Q as it stands; Q = I is the linear law.
+/// Tangent of Q sigma for constant Q; Q = I is the linear law.
 PointTangent tangent_in_frame(const LawConstants& c, const Mat3& Q) noexcept {
   PointTangent C;
   for (int k = 0; k < 9; ++k) {
@@ -124,7 +124,7 @@ struct VolumeFunction {
   double value, first, second;  // g and its derivatives
 };
 
-/// J^(-2/3), below `least_volume` its parabola.
+/// J^(-2/3), continued by its parabola below `least_volume`.
 VolumeFunction shape_factor(double J) noexcept {
   const double at = std::max(J, least_volume), by = std::min(J - least_volume, 0.0);
   const double root = std::cbrt(at), value = 1.0 / (root * root), first = -2.0 / 3.0 * value / at,
@@ -166,7 +166,7 @@ PointTangent neo_hookean_tangent(const LawConstants& c, const Mat3& F) noexcept 
   return C;
 }
 
-/// F with the stretch across that leaves no stress there.
+/// F with the transverse stretch that makes the transverse stress zero.
 Mat3 without_stress_across(const LawConstants& c, Mat3 F) noexcept {
   F(2, 2) = 1.0;
   for (int k = 0; k < 30; ++k) {
@@ -178,7 +178,7 @@ Mat3 without_stress_across(const LawConstants& c, Mat3 F) noexcept {
   return F;
 }
 
-/// What is left in the plane when the stretch across gives way.
+/// Condenses the transverse stretch out of the tangent, for plane stress.
 void condense_across(PointTangent& C) noexcept {
   if (!(C(8, 8) > 0.0)) return;
   const Vector9 across = C.col(8);

@@ -9,9 +9,9 @@ namespace palpate {
 namespace {
 
 constexpr int most_iterations = 20;
-constexpr double flat = 1e-6;  // det F, of |F|^3, below which Newton's iteration is not tried
+constexpr double flat = 1e-6;  // det F relative to |F|^3 below which Newton's iteration is not tried
 
-/// det F F^-T, which every F has.
+/// det F F^-T, defined for every F.
 Mat3 cofactors(const Mat3& F) noexcept {
   Mat3 C;
   C.col(0) = F.col(1).cross(F.col(2));

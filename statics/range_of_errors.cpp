@@ -10,7 +10,7 @@ double range_within(std::span<const double> rotation, std::span<const double> er
   for (std::size_t k = 0; k < rotation.size(); ++k) {
     const double error = std::abs(errors[k]);
     if (!(error <= most)) {
-      if (!std::isfinite(error)) return last;  // no line leads there
+      if (!std::isfinite(error)) return last;  // not interpolated
       return last + (most - before) / (error - before) * (rotation[k] - last);
     }
     last = rotation[k];

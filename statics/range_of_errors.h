@@ -1,15 +1,15 @@
-// Up to where a curve of errors is small.
+// Range of rotations over which errors stay small.
 #pragma once
 
 #include <span>
 
 namespace palpate {
 
-inline constexpr double good_bending_error = 0.05;  ///< of a force: smaller ones are hardly felt
+inline constexpr double good_bending_error = 0.05;  ///< of a force; smaller errors are hardly felt
 
-/// The rotation up to which errors stay within `most`, without their sign, by straight lines between the
-/// levels, from none at 0: of errors [L] at rotations [L] that ascend. The last rotation where all of them
-/// do.
+/// Rotation up to which |errors| stay within `most`, interpolated linearly between the levels, starting from
+/// no error at 0. `errors` [L] belong to `rotation` [L], which ascends. The last rotation if all of them stay
+/// within.
 double range_within(std::span<const double> rotation, std::span<const double> errors, double most) noexcept;
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// How the equations of an implicit step are solved.
+// Kinds of solvers for the equations of an implicit step.
 #pragma once
 
 #include <cstdint>
@@ -6,11 +6,11 @@
 namespace palpate {
 
 enum class SolverKind : std::uint8_t {
-  factor,              ///< L L^T of each matrix, the order of elimination found once
+  factor,              ///< L L^T of each matrix, with one elimination order for all
   conjugate_gradient,  ///< conjugate gradients, preconditioned by the factor of an older matrix
 };
 
-/// The names that users give: factor, cg.
+/// Names of the solvers in options: factor, cg.
 constexpr const char* name_of(SolverKind kind) noexcept {
   return kind == SolverKind::factor ? "factor" : "cg";
 }

@@ -1,4 +1,4 @@
-// Springs along the edges of a mesh, in place of its elements.
+// Springs along the edges of a mesh, which replace its elements.
 #pragma once
 
 #include <span>
@@ -12,15 +12,15 @@ namespace palpate {
 /// A spring between two nodes.
 struct Spring {
   Index a, b;
-  double stiffness;  ///< force by extension [N/m]
+  double stiffness;  ///< force per extension [N/m]
   double length;     ///< at rest [m]
 };
 
-/// One spring for each edge of a mesh of tri3 or tet4, fitted to Young's modulus as Van Gelder (1998) does:
-/// k = E sum V_e / L^2 over the elements at the edge, V_e their volume (in the plane area times `thickness`
-/// [m]). Summed over directions, sum k L^2 is 6 E V in space and 3 E V in the plane, with which a network of
-/// all directions has Young's modulus E. Its Poisson's ratio is 1/4 in space and 1/3 in the plane, whatever
-/// the material's: central forces allow no other. `material_of_element` [E]. Throws Error for other elements.
+/// One spring per edge of a mesh of tri3 or tet4, fitted to Young's modulus as by Van Gelder (1998): k = E
+/// sum V_e / L^2 over the elements at the edge, with V_e their volume (in the plane area times `thickness`
+/// [m]). Over all springs sum k L^2 is 6 E V in space and 3 E V in the plane, which gives an isotropic
+/// network Young's modulus E. Its Poisson's ratio is 1/4 in space and 1/3 in the plane, whatever the
+/// material's: central forces allow no other. `material_of_element` [E]. Throws Error for other elements.
 std::vector<Spring> fitted_springs(const Mesh& mesh, std::span<const Material> materials,
                                    std::span<const Index> material_of_element, double thickness);
 

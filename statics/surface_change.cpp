@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// Two edges and the normal; in the plane the edge, across it and z.
+/// Two edges and the normal; in the plane the edge, its normal and z.
 Mat3 frame_of(const std::array<Vec3, 3>& x, std::size_t dimension) noexcept {
   Mat3 frame;
   frame.col(0) = x[1] - x[0];
@@ -27,8 +27,8 @@ Mat3 frame_of(const std::array<Vec3, 3>& x, std::size_t dimension) noexcept {
   return frame;
 }
 
-/// Whether a simplex can exceed the largest so far whose deformation gradient F is `change` = |F - I| from
-/// none: its stretches are no further from 1, and its rotation R has |R - I| <= 2 |F - I|.
+/// True if a simplex with `change` = |F - I| of its deformation gradient can exceed the largest so far: its
+/// stretches differ from 1 by no more, and its rotation R has |R - I| <= 2 |F - I|.
 bool can_be_larger(const SurfaceChange& largest, double change) noexcept {
   return change > largest.strain || change > std::numbers::sqrt2 * std::sin(0.5 * largest.rotation);
 }
@@ -48,7 +48,7 @@ SurfaceChange surface_change(int dimension, std::span<const Index> simplices, st
     }
     const Mat3 rest_frame = frame_of(X, d);
     const Mat3 change = (frame_of(x, d) - rest_frame) * rest_frame.inverse();
-    if (!change.allFinite()) continue;  // a simplex without size says nothing
+    if (!change.allFinite()) continue;  // skip a degenerate simplex
     if (!can_be_larger(largest, change.norm())) continue;
     const Mat3 F = Mat3::Identity() + change;
     const Mat3 R = nearest_rotation(F);

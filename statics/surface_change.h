@@ -1,4 +1,4 @@
-// How far a surface is from where it was: what small strain has to bear.
+// Rotation and strain of a displaced surface, which limit small strain theory.
 #pragma once
 
 #include <span>
@@ -7,14 +7,14 @@
 
 namespace palpate {
 
-/// The largest rotation and the largest strain on a displaced surface.
+/// Largest rotation and largest strain on a displaced surface.
 struct SurfaceChange {
-  double rotation = 0.0;  ///< by which a simplex has turned [rad]
-  double strain = 0.0;    ///< principal strain within a simplex, stretch less 1, without its sign [-]
+  double rotation = 0.0;  ///< rotation of a simplex [rad]
+  double strain = 0.0;    ///< largest |stretch - 1| within a simplex [-]
 };
 
-/// `simplices` [F d]: nodes of triangles, in the plane of lines; `rest` [S]: where the nodes are without it;
-/// `u` [S]: displacement from there [m].
+/// `simplices` [F d]: nodes of triangles, in the plane of lines; `rest` [S]: positions without the
+/// displacement; `u` [S]: displacement from there [m].
 SurfaceChange surface_change(int dimension, std::span<const Index> simplices, std::span<const Vec3> rest,
                              std::span<const Vec3> u) noexcept;
 

@@ -17,9 +17,9 @@ namespace palpate {
 namespace {
 
 constexpr double least_share =
-    1e-12;  // of the longest edge squared: a triangle's area, else it has no direction
+    1e-12;  // area of a triangle, relative to its longest edge squared, below which it has no direction
 
-/// Groups of surface nodes that simplices join.
+/// Groups of surface nodes connected by simplices.
 class Parts {
  public:
   explicit Parts(std::size_t nodes) : parent_(nodes) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -104,7 +104,7 @@ void SurfaceWarp::add_line(Index a, Index b) {
                  Edge{.a = a, .b = b, .c = 0.0, .X = X}}});
 }
 
-/// A node that is not stored is held along every axis.
+/// Numbers the nodes that can move along each axis. A node that is not stored is held along all of them.
 void SurfaceWarp::number_free_nodes() {
   const std::span<const Index> stored = surface_.stored;
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
@@ -164,7 +164,7 @@ void SurfaceWarp::factor() {
   }
 }
 
-/// x of the nodes that can move, from b by axis, which is lost.
+/// Solves for x of the nodes that can move, from b by axis, which is overwritten.
 void SurfaceWarp::solve(std::array<Eigen::VectorXd, 3>& b, std::vector<Vec3>& x) const {
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
     b[axis] = factor_[axis].solve(b[axis]);

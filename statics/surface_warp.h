@@ -1,4 +1,4 @@
-// The surface of a body whose parts turn by what their linear displacement says.
+// Warped surface: each part rotated by its linear displacement's rotation.
 #pragma once
 
 #include <array>
@@ -11,39 +11,39 @@
 
 namespace palpate {
 
-/// A surface as warping wants it: S nodes on it, of which n / d have a displacement.
+/// Surface to warp: S nodes, n / d of which have a displacement.
 struct WarpSurface {
   int dimension = 3;               ///< d
-  std::vector<Vec3> rest;          ///< [S] where its nodes rest [m]
+  std::vector<Vec3> rest;          ///< [S] positions at rest [m]
   std::vector<Index> simplices;    ///< [F d] nodes of its triangles, in the plane of its lines, outward
-  std::vector<Index> stored;       ///< [S] number in arrays [n], -1 of nodes that are held along every axis
-  std::vector<std::uint8_t> held;  ///< [S] bit `axis` is set where the node is held along it
+  std::vector<Index> stored;       ///< [S] number in arrays [n], -1 for nodes held along every axis
+  std::vector<std::uint8_t> held;  ///< [S] bit `axis` is set if the node is held along it
 
-  [[nodiscard]] Index stored_nodes() const noexcept;  ///< n / d, one more than the largest number
+  [[nodiscard]] Index stored_nodes() const noexcept;  ///< n / d, the largest number plus one
 };
 
-/// Takes the linear displacement u of the surface's nodes to x(u), where they are when each simplex of the
-/// surface turns as far as u says (docs/warp.md). A simplex s has the rotation vector
+/// Maps the linear displacement u of the surface's nodes to positions x(u), for which each simplex of the
+/// surface rotates as u implies (docs/warp.md). A simplex s has the rotation vector
 ///
 ///   w_s = A_s u,
 ///
 /// from the curl of u within it and the tilt of its normal: on a surface without shear tractions that is the
-/// rotation of the body there. Its edges X_ab become t_ab = exp(w_s) (X_ab + u_a - u_b - w_s x X_ab), turned
-/// and with their small strain. Where the nodes are follows from all edges at once,
+/// rotation of the body there. Its edges X_ab become t_ab = exp(w_s) (X_ab + u_a - u_b - w_s x X_ab), rotated
+/// and with their small strain. All edges together determine the positions,
 ///
 ///   min_x sum_edges c_ab |x_a - x_b - t_ab|^2, held nodes where they rest,
 ///
-/// a sparse system that is factored once (c: half the cotangent of the angle across, in the plane 1 /
-/// length). So rotation adds up along the body: a tip is where all below it have turned it to. x(u) is u to
+/// a sparse system factorised once (c: half the cotangent of the opposite angle, in the plane 1 / length).
+/// Rotations thus add up along the body: a tip goes where everything below it has rotated it. x(u) is u to
 /// first order.
 ///
-/// Const once made: any number of threads may use it, each with a `Place` of its own.
+/// Const after construction: any number of threads may use it, each with a `Place` of its own.
 class SurfaceWarp {
  public:
-  /// Throws Error where a part of the surface has no held node along some axis.
+  /// Throws Error if a part of the surface has no held node along some axis.
   explicit SurfaceWarp(WarpSurface surface);
 
-  /// What is found on the way from u to x, and memory for it.
+  /// Intermediate results between u and x, and memory for them.
   struct Place {
     explicit Place(const SurfaceWarp& warp);
     std::vector<Vec3> u;               ///< [S] linear displacement [m]
@@ -55,13 +55,12 @@ class SurfaceWarp {
 
   /// Fills `place` for u [n] of the stored nodes.
   void warp(std::span<const double> u, Place& place) const;
-  /// x(u) less where the nodes rest [n], of the stored nodes.
+  /// x(u) minus the rest positions [n], for the stored nodes.
   void displacement(const Place& place, std::span<double> moved) const noexcept;
-  /// g = J^T f [n]: what forces f [n] on the stored nodes of the warped body are on the linear one, so that
-  /// they do the same work, J = dx / du at `place` (whose scratch it takes).
+  /// g = J^T f [n] with J = dx / du at `place` (whose scratch it uses): the forces on the linear body that do
+  /// the same work as forces f [n] on the stored nodes of the warped one.
   void pull_back(Place& place, std::span<const double> f, std::span<double> g) const;
-  /// x' = J u' [n], by how much stored nodes move with a change u' [n] of u at `place` (whose scratch it
-  /// takes).
+  /// x' = J u' [n]: motion of the stored nodes for a change u' [n] of u at `place` (whose scratch it uses).
   void push_forward(Place& place, std::span<const double> du, std::span<double> dx) const;
   /// Rotations of the stored nodes: exp of the mean w of the simplices around each.
   void rotations(const Place& place, std::vector<Mat3>& R) const;
@@ -74,7 +73,7 @@ class SurfaceWarp {
     double c;    // weight
     Vec3 X;      // from b to a at rest [m]
   };
-  /// Its edges, and h_k and N of w = sum_k N (h_k . u_k) / 2 - h_k (N . u_k).
+  /// Nodes, edges, and h_k and N of w = sum_k N (h_k . u_k) / 2 - h_k (N . u_k).
   struct Simplex {
     std::array<Index, 3> nodes;
     std::array<Vec3, 3> h;
@@ -89,8 +88,8 @@ class SurfaceWarp {
   void check_held() const;
   void factor();
   void solve(std::array<Eigen::VectorXd, 3>& b, std::vector<Vec3>& x) const;
-  /// The edge is to become t: what it adds to the right-hand sides. `held` [S]: where nodes are that cannot
-  /// move.
+  /// Adds an edge's part of the right-hand sides, with t as its target. `held` [S]: positions of nodes that
+  /// cannot move.
   void join(const Edge& edge, const Vec3& t, std::span<const Vec3> held, Place& place) const;
   [[nodiscard]] Vec3 rotation(const Simplex& simplex, const std::vector<Vec3>& u) const noexcept;
 

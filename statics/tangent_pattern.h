@@ -1,4 +1,4 @@
-// Where the entries of cells lie in a sparse matrix, found once.
+// Places of element entries in a sparse matrix, found once.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -12,28 +12,29 @@ namespace palpate {
 
 using LiveMatrix = Eigen::SparseMatrix<double>;  ///< of free dofs; only its lower triangle is stored
 
-/// The sparse matrix that cells (elements or springs) add up to, and where each of their entries goes.
+/// Pattern of the sparse matrix that cells (elements or springs) sum up to, and the place of each of their
+/// entries.
 class TangentPattern {
  public:
   TangentPattern() = default;
-  /// `cells` [cells * nodes_per_cell] node numbers; `free_of_dof` [d N] number among the free dofs, -1 for
+  /// `cells` [cells * nodes_per_cell] node numbers; `free_of_dof` [d N] number among the free dofs, -1 if
   /// held.
   TangentPattern(std::span<const Index> cells, int nodes_per_cell, int dimension,
                  std::span<const Index> free_of_dof, Index free_dofs);
 
-  /// The matrix with all entries zero.
+  /// The pattern's matrix with all entries zero.
   [[nodiscard]] const LiveMatrix& zero() const noexcept { return zero_; }
-  /// Places of a cell's entries in the values: of (p, q), q <= p, dofs of the cell, at p (p + 1) / 2 + q; -1
-  /// where one of them is held.
+  /// Places of a cell's entries in the values: for dofs p and q <= p of the cell at p (p + 1) / 2 + q; -1 if
+  /// one of them is held.
   [[nodiscard]] std::span<const Index> places(Index cell) const noexcept {
     return {places_.data() + static_cast<std::size_t>(cell) * entries_, entries_};
   }
-  /// [n] where the diagonal lies in the values.
+  /// [n] places of the diagonal in the values.
   [[nodiscard]] std::span<const Index> diagonal() const noexcept { return diagonal_; }
 
  private:
   LiveMatrix zero_;
-  std::size_t entries_ = 0;  // of a cell
+  std::size_t entries_ = 0;  // per cell
   std::vector<Index> places_;
   std::vector<Index> diagonal_;
 };

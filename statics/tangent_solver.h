@@ -1,4 +1,4 @@
-// Solves with the tangent: by its factor, or by conjugate gradients.
+// Solver for the tangent, by its factor or by conjugate gradients.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,8 @@ namespace palpate {
 
 struct TangentSolverOptions {
   SolverKind kind = SolverKind::factor;
-  double tolerance = 1e-8;   ///< conjugate gradients: |A x - b|, of |b|
-  int most_iterations = 12;  ///< conjugate gradients: after more the preconditioner is made anew
+  double tolerance = 1e-8;   ///< conjugate gradients: |A x - b|, relative to |b|
+  int most_iterations = 12;  ///< conjugate gradients: after more the preconditioner is renewed
 };
 
 /// A^-1 for symmetric positive definite matrices of one pattern, one after the other.
@@ -21,14 +21,15 @@ class TangentSolver {
  public:
   explicit TangentSolver(const TangentSolverOptions& options) : options_(options) {}
 
-  /// From now on A is this matrix (its lower triangle), which must live on. False when it is not positive
-  /// definite or not finite.
+  /// Sets A to this matrix (its lower triangle), which must outlive its use. Returns false if it is not
+  /// positive definite or not finite.
   bool set(const LiveMatrix& A);
 
-  /// x = A^-1 b. False when conjugate gradients do not get there.
+  /// x = A^-1 b. Returns false if conjugate gradients do not converge.
   bool solve(const Eigen::VectorXd& b, Eigen::VectorXd& x);
 
-  /// Solves with the factor at hand, which by conjugate gradients may be of an older matrix.
+  /// Solves with the present factor, which may be that of an older matrix if the solver is conjugate
+  /// gradients.
   [[nodiscard]] Eigen::MatrixXd by_factor(const Eigen::MatrixXd& b) const { return factor_.solve(b); }
 
   [[nodiscard]] std::int64_t factorisations() const noexcept { return factorisations_; }

@@ -9,7 +9,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t most_mixed = 6;  // rounds
-constexpr double most_turn = 3.0;      // [rad] more than that and the way round is not known
+constexpr double most_turn = 3.0;      // [rad] beyond it the axis of the rotation is ambiguous
 
 double largest(std::span<const double> values) {
   double most = 0.0;
@@ -68,7 +68,7 @@ bool WarpBalance::find(std::span<const Index> nodes, std::span<const double> for
   return false;
 }
 
-/// Anderson's mixing: the sum of the last rounds, of weights that are 1 together, whose r is smallest.
+/// Anderson mixing: the affine combination of the last rounds (weights sum to 1) with the smallest r.
 void WarpBalance::mix(std::size_t rounds) {
   const std::size_t last = (rounds - 1) % most_mixed, count = std::min(rounds, most_mixed) - 1;
   const Round& now = rounds_[last];
@@ -91,7 +91,7 @@ void WarpBalance::mix(std::size_t rounds) {
     u -= share[static_cast<Eigen::Index>(k)] * (map(now.v) - map(before[k]->v));
 }
 
-/// Nothing turns by more than `most_turn`: beyond it forces are larger than a body bears that turns so far.
+/// Limits all rotations to `most_turn`; larger ones need forces that no body of such a rotation bears.
 void WarpBalance::keep_within_reach() {
   if (!std::all_of(u_.begin(), u_.end(), [](double value) { return std::isfinite(value); })) return rest();
   warp_.warp(u_, place_);
