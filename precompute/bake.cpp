@@ -47,8 +47,7 @@ namespace palpate {
 namespace {
 
 constexpr int probe_count = 4;
-constexpr std::int64_t large_file =
-    4'000'000'000;  // [byte] more than many computers can load beside all else
+constexpr std::int64_t large_file = 4'000'000'000;  // [byte] too large for many computers to load
 
 void print_plan(const Plan& plan, const Model& model, const Description& description, bool compressed,
                 Progress& progress) {
@@ -79,7 +78,7 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
                             static_cast<double>(plan.file_bytes) * 1e-6, precision));
 }
 
-/// Once all parts of the plan are known.
+/// Prints the required memory, once all parts of the plan are known.
 void print_memory(const Plan& plan, const BakeOptions& options, bool compressed, Progress& progress) {
   const std::string solves =
       compressed ? "" : fmt::format("column solves: {:.3g} GFlop, ", plan.flops * 1e-9);
@@ -92,22 +91,21 @@ constexpr const char* factor_stage = "factorising K";
 constexpr const char* overlay_stage = "overlays";
 constexpr const char* modes_stage = "looking for modes";
 constexpr const char* warp_stage = "bending the body";
-constexpr double warp_factors =
-    75.0;  // per level: some 25 without supernodes, which take three times as long
+constexpr double warp_factors = 75.0;  // per level: about 25 without supernodes, each three times as slow
 constexpr const char* precision_stage = "choosing the precision";
 constexpr const char* inverse_factor_stage = "factorising K_bar";
 constexpr const char* write_stage = "writing the file";
 
 struct Plans {
   Plan plan;
-  Plan packed;  // of every entry, where it is to be compressed
+  Plan packed;  // for every entry, if compression is planned
   std::optional<CompressionPlan> compression;
   OverlayPlan overlays;
   DynamicsPlan dynamics;
-  Index warp_levels = 0;  // of a study of [warp]
+  Index warp_levels = 0;  // for a study of [warp]
 };
 
-/// What the stages that solve columns have in common.
+/// Arguments common to the stages that solve columns.
 struct Shared {
   int jobs;
   Team& team;
@@ -116,7 +114,7 @@ struct Shared {
   std::function<bool()> interrupted;
 };
 
-/// What follows the plan, by so many ranks.
+/// Stages after the plan, for this number of ranks.
 std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   const auto& [plan, packed_plan, compression, overlays, dynamics, warp_levels] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
@@ -143,7 +141,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   return stages;
 }
 
-/// What all ranks take together.
+/// Text on the total requirements of all ranks.
 std::string ranks_text(const Plans& plans, const std::vector<Tile>& tiles, int jobs, int ranks) {
   const Plan& plan = plans.plan;
   double seconds = 0.0;
@@ -161,7 +159,7 @@ std::string ranks_text(const Plans& plans, const std::vector<Tile>& tiles, int j
   return text;
 }
 
-/// What makes a large file smaller.
+/// Advice for reducing the size of a large file.
 std::string size_advice(const Description& description) {
   const MeshOptions& mesh = description.mesh;
   const bool keeps_boundary = std::holds_alternative<SurfaceGeometry>(description.geometry) &&
@@ -173,11 +171,11 @@ std::string size_advice(const Description& description) {
   return advice;
 }
 
-/// The stored nodes in the order of the columns, which comes from the factor.
+/// Stored nodes in the order of the columns, which the factor determines.
 StoredNumbering number_stored(const GreensSolver& solver, const Stiffness& stiffness, int dimension) {
   const std::vector<std::int64_t> columns = solver.stored_dofs();
   const auto d = static_cast<std::size_t>(dimension);
-  std::vector<Index> nodes(columns.size() / d, -1);  // of the mesh
+  std::vector<Index> nodes(columns.size() / d, -1);  // mesh nodes
   for (std::size_t k = 0; k < columns.size(); ++k) {
     if (columns[k] < 0) continue;
     const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(columns[k])];
@@ -190,7 +188,7 @@ StoredNumbering number_stored(const GreensSolver& solver, const Stiffness& stiff
   return {nodes, columns};
 }
 
-/// Everything that the file holds but Green's functions, probes and the rest state.
+/// Everything in the file except Green's functions, probes and the rest state.
 Model describe_model(const Description& description, const BakeOptions& options, MeshedBody body) {
   Model model;
   model.name = description.name;
@@ -206,7 +204,7 @@ Model describe_model(const Description& description, const BakeOptions& options,
   model.layers = description.scope == Scope::layers ? description.layers : 0;
   model.quality = measure_quality(body.mesh);
   model.mesh = std::move(body.mesh);
-  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());  // until it is known
+  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());  // until it is computed
   model.sources.push_back(describe_source("model", description.file, options.output));
   for (const auto& file : input_files(description)) {
     model.sources.push_back(describe_source("geometry", file, options.output));
@@ -214,8 +212,8 @@ Model describe_model(const Description& description, const BakeOptions& options,
   return model;
 }
 
-/// Random forces on all stored dofs, in [-1, 1) N (those on held ones move nothing), and their displacements
-/// by a plain solve: a second route past the columns.
+/// Random forces on all stored dofs, in [-1, 1) N (those on held dofs have no effect), and their
+/// displacements by a plain solve, independent of the columns.
 std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int64_t>& stored_dofs) {
   std::mt19937_64 random(20240229);
   std::vector<Probe> probes(probe_count);
@@ -240,8 +238,7 @@ SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffne
                              options.newmark);
 }
 
-/// Decides for the precision of all packed matrices and puts their smooth parts and force errors into the
-/// model.
+/// Chooses the precision of all packed matrices and sets their smooth parts and force errors in the model.
 Precision decide_precision(const Description& description, const ElasticBody& body,
                            const Stiffness& stiffness, const Factor& factor,
                            const std::vector<std::int64_t>& stored_dofs, Team& team, int jobs, Model& model,
@@ -275,7 +272,8 @@ Precision decide_precision(const Description& description, const ElasticBody& bo
   return choice.precision;
 }
 
-/// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
+/// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. Returns false if
+/// interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
                    const Plan& plan, const PieceRange& columns, bool spread, const Shared& run,
@@ -316,7 +314,7 @@ DynamicsPlan announce_dynamics(const Description& description, const Plan& plan,
   return dynamics;
 }
 
-/// What the compression takes, in place of all columns.
+/// Replaces the requirements of all columns by those of the compression.
 void take_over(const CompressionPlan& compression, Plan& plan) {
   const std::int64_t near_bytes = compression.frame.bytes();
   plan.file_bytes = near_bytes + compression.far_bytes;
@@ -325,7 +323,7 @@ void take_over(const CompressionPlan& compression, Plan& plan) {
   for (const Stage& stage : compression_stages(compression)) plan.seconds += stage.seconds;
 }
 
-/// Says what the Green's functions will take.
+/// Prints the requirements of the Green's functions.
 void announce_greens(const Plans& plans, const Model& model, const Description& description,
                      Progress& progress) {
   const Plan& plan = plans.plan;
@@ -339,7 +337,7 @@ void announce_greens(const Plans& plans, const Model& model, const Description& 
                                                     size_advice(description)));
 }
 
-/// Plans all stages and says what they will take.
+/// Plans all stages and prints their requirements.
 Plans announce_plans(const Description& description, const BakeOptions& options, const Model& model,
                      const Stiffness& stiffness, const Factor& factor, const GreensSolver& solver,
                      Progress& progress) {
@@ -361,15 +359,15 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
     plans.dynamics = announce_dynamics(description, plan, stiffness, progress);
     plan.dynamics_bytes = plans.dynamics.memory_bytes;
     if (plans.dynamics.method == DynamicsMethod::modal) plan.dynamics_bytes += inertia_bytes(factor);
-    if (plans.dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+    if (plans.dynamics.method == DynamicsMethod::packed)  // factor of K_bar beside that of K
       plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
   print_memory(plan, options, plans.compression.has_value(), progress);
   return plans;
 }
 
-/// By the threads of each process for itself: a block of vectors has work for two. False, in all processes,
-/// when interrupted.
+/// Adds dynamics with the threads of each process alone, since a block of vectors keeps only two busy.
+/// Returns false, in all processes, if interrupted.
 bool add_dynamics(const Description& description, const DynamicsPlan& plan, const ElasticBody& body,
                   const Stiffness& stiffness, const Factor& factor,
                   const std::vector<std::int64_t>& stored_dofs, Team& team, int jobs, Model& model,
@@ -377,7 +375,7 @@ bool add_dynamics(const Description& description, const DynamicsPlan& plan, cons
   if (!description.dynamics) return true;
   if (plan.method == DynamicsMethod::modal) progress.begin(modes_stage);
   Team alone;
-  const bool in_step = factor.spread_numbers() != nullptr;  // none may end before the others
+  const bool in_step = factor.spread_numbers() != nullptr;  // no process may stop before the others
   TeamSharing sharing(alone, jobs, [&] { return !in_step && interrupt.requested(); });
   std::optional<StoredDynamics> dynamics = describe_dynamics(
       *description.dynamics, plan, stiffness.K, assemble_mass(body, stiffness, description.dynamics->lumped),
@@ -387,7 +385,7 @@ bool add_dynamics(const Description& description, const DynamicsPlan& plan, cons
   return true;
 }
 
-/// Bends the body where that is asked for. False, in all processes, when interrupted.
+/// Adds a study of warping if requested. Returns false, in all processes, if interrupted.
 bool add_warp(const Description& description, Team& team, Model& model, Progress& progress,
               const InterruptGuard& interrupt) {
   if (!description.warp) return true;
@@ -403,14 +401,14 @@ bool add_warp(const Description& description, Team& team, Model& model, Progress
   return true;
 }
 
-/// What is found once the file is begun.
+/// Results computed after the file is begun.
 struct Solved {
   std::vector<Probe> probes;
   std::shared_ptr<const HierarchicalMatrix> compressed;
 };
 
-/// Computes the columns of the packed matrices, of a part or all, and the leader the probes of the first one.
-/// Nothing when interrupted.
+/// Computes the columns of the packed matrices, of a part or all, and in the leader the probes of the first
+/// matrix. Returns nullopt if interrupted.
 std::optional<Solved> solve_matrices(const Description& description, const ElasticBody& body,
                                      const Stiffness& stiffness, std::unique_ptr<Factor> factor,
                                      const GreensSolver& solver, const std::vector<std::uint8_t>& stored,
@@ -425,7 +423,7 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
   const bool spread = factor->spread_numbers() != nullptr;
   if ((run.team.leads() || spread) && !part) solved.probes = make_probes(*factor, stored_dofs);
   if (plans.dynamics.method == DynamicsMethod::packed) {
-    factor.reset();  // its memory is for that of K_bar
+    factor.reset();  // frees its memory for the factor of K_bar
     if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, columns,
                        spread, run, writer))
       return {};
@@ -433,11 +431,12 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
   return solved;
 }
 
-/// Compresses the Green's functions in the leader, which the others help to solve. Nothing when interrupted.
+/// Compresses the Green's functions in the leader while the other processes help to solve. Returns nullopt if
+/// interrupted.
 std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const Factor& factor,
                                              SpreadNumbers& spread, const Shared& run, ModelWriter& writer) {
   Solved solved;
-  std::string refused;  // why it is out of reach
+  std::string refused;  // reason if it is out of reach
   const auto compress = [&](const std::function<bool()>& interrupted) {
     constexpr int one_thread = 1;  // only one solves with all ranks
     Team alone;
@@ -458,16 +457,17 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   return whole ? std::optional(std::move(solved)) : std::nullopt;
 }
 
-/// From here on a process that `reads` sees what all have written, on whatever machine. Those that do not
-/// read may find the file sealed already, under its own name.
+/// Makes data written by all processes, on any machine, visible to processes that read (`reads`). To the
+/// others the file may already be complete and renamed.
 void see_all(Team& team, ModelWriter& writer, bool reads) {
   if (team.size() == 1) return;
   writer.flush();
-  team.any(false);  // all have
+  team.any(false);  // all have flushed
   if (reads) writer.look_again();
 }
 
-/// Compresses the Green's functions; a part has some of the near pairs. Nothing when interrupted.
+/// Compresses the Green's functions; a part solves for some of the near pairs. Returns nullopt if
+/// interrupted.
 std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
                                        const std::optional<BakePart>& part, const Shared& run,
                                        ModelWriter& writer) {
@@ -485,7 +485,7 @@ std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor
   return solved;
 }
 
-/// Condenses the overlays that the file is to keep. False when interrupted.
+/// Condenses the overlays for the file. Returns false if interrupted.
 bool add_overlays(const Description& description, const OverlayPlan& overlays, Team& team, int jobs,
                   Model& model, Progress& progress, const InterruptGuard& interrupt) {
   progress.begin(overlay_stage);
@@ -513,7 +513,7 @@ void check_touchable(const Surface& surface, const Model& model, const Descripti
   }
 }
 
-/// Where the model may be written; before any work.
+/// Path that the model may be written to; checked before any work.
 std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
   OutputPaths paths(options.force, options.keep);
   if (!options.report.empty() && options.report != "-")
@@ -524,7 +524,7 @@ std::filesystem::path check_output(const Description& description, const BakeOpt
   return paths.add(options.output, OutputKind::model, "--output");
 }
 
-/// The options with the paths that are read and written, which are checked by the leader.
+/// The options with the paths to read and write, as checked by the leader.
 BakeOptions with_paths(const Description& description, const BakeOptions& asked, Team& team) {
   BakeOptions options = asked;
   if (options.join) options.parts = find_parts(options.output, options.parts);
@@ -538,7 +538,7 @@ BakeOptions with_paths(const Description& description, const BakeOptions& asked,
   return options;
 }
 
-/// The part that is asked for: of all matrices the same columns.
+/// The requested part: the same columns of all matrices.
 std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& plans,
                                      const GreensSolver& solver) {
   if (!options.part) return {};
@@ -550,11 +550,11 @@ std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& pl
   return BakePart{number, parts, std::vector<PieceRange>(two ? 2 : 1, pieces)};
 }
 
-/// The output's journal, held from the start on, so that a second run is refused before it has done all that
-/// comes before the columns. One that the run leaves empty is removed.
+/// Lock on the output's journal from the start of the run, so that a second run is refused before it does the
+/// work that precedes the columns. A journal left empty is removed.
 class Claim {
  public:
-  /// Throws Error where another process holds it.
+  /// Throws Error if another process holds the lock.
   Claim(const std::filesystem::path& output, InterruptGuard& interrupt)
       : path_(output.string() + ".progress"), journal_(std::in_place, path_) {
     interrupt.remove_if_empty(path_);
@@ -566,7 +566,7 @@ class Claim {
   Claim(const Claim&) = delete;
   Claim& operator=(const Claim&) = delete;
 
-  /// The writer takes it from here.
+  /// Releases the journal to the writer.
   void hand_over() { journal_.reset(); }
 
  private:
@@ -574,7 +574,7 @@ class Claim {
   std::optional<Journal> journal_;
 };
 
-/// Begins the file, or goes on with it: a part's own, the leader's, or that which the leader has begun.
+/// Creates or continues the file: a part's own, the leader's, or the one that the leader has begun.
 std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::optional<BakePart>& part,
                                          const Model& model, Precision precision, bool of_parts, Team& team) {
   const Leftovers leftovers = options.discard ? Leftovers::discard : Leftovers::resume;
@@ -590,7 +590,7 @@ std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::
   return writer;
 }
 
-/// The stages of a bake, which share all of this.
+/// A bake: its stages and their common data.
 class Bake {
  public:
   Bake(const Description& description, const BakeOptions& options, Team& team, Progress& progress,
@@ -615,7 +615,7 @@ class Bake {
       progress_.line(fmt::format("factor over {} ranks: {}; {} % of work space beyond the estimate",
                                  team_.size(), text_of(*spread_, true), spread_->room));
     }
-    // ranks end together
+    // ranks stop together
     interrupt_.note_from_now_on(team_.size() > 1 ? "" : interruption_text(options_));
     if (has_fallen_back()) fall_back("as an earlier run has found, they cannot be compressed this exactly");
     try {
@@ -629,7 +629,7 @@ class Bake {
   }
 
   [[nodiscard]] const Plan& plan() const { return plans_.plan; }
-  /// Memory of all that was begun, one after the other.
+  /// Largest planned memory of all attempts [byte].
   [[nodiscard]] std::int64_t foretold() const { return std::max(foretold_, expected_memory(plans_.plan)); }
   [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
   [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
@@ -669,8 +669,8 @@ class Bake {
   Precision precision_ = Precision::single_precision;
   TileCounts tiles_;
   std::optional<SpreadMemory> spread_;  // of a factor over several processes
-  std::string fell_back_;               // why not compressed
-  std::int64_t foretold_ = 0;           // of the compression that was out of reach
+  std::string fell_back_;               // reason for not compressing
+  std::int64_t foretold_ = 0;           // of a compression that was out of reach
 };
 
 MeshedBody Bake::mesh() {
@@ -686,8 +686,8 @@ MeshedBody Bake::mesh() {
   return body;
 }
 
-/// Mesh, materials and loads, for solvers that need no Green's functions. Nothing is solved: the rest state
-/// is where held nodes are.
+/// Writes mesh, materials and loads, for solvers that need no Green's functions. Solves nothing: the rest
+/// state has only the displacements of held nodes.
 BakeResult Bake::write_without_greens() {
   if (options_.part || options_.join) {
     throw Error("scope \"none\" has no columns to share between parts", description_.file.string(),
@@ -711,7 +711,7 @@ BakeResult Bake::write_without_greens() {
   return BakeResult::done;
 }
 
-/// Mesh, K and the plan.
+/// Makes mesh, K and the plan.
 void Bake::assemble() {
   MeshedBody body = mesh();
   progress_.begin("assembling K");
@@ -723,7 +723,7 @@ void Bake::assemble() {
   elastic_->prescribed = prescribed_;
   stiffness_ = assemble_stiffness(*elastic_);
   take_blas_room(options_.jobs);
-  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
+  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes do not depend on `jobs`
   progress_.begin("ordering K");
   factor_ = std::make_unique<Factor>(stiffness_.K, stiffness_.node_start);
   stored_ = stored_dof_marks(model_.mesh, surface, stiffness_, description_.scope, description_.layers);
@@ -739,7 +739,7 @@ void Bake::assemble() {
   part_ = planned_part(options_, plans_, *solver_);
 }
 
-/// Hands the factor to all processes where that is asked for, or where one of them cannot hold it.
+/// Distributes the factor over all processes if requested, or if one of them cannot hold it.
 void Bake::spread_where_needed(int ranks) {
   if (options_.spreading == Spreading::never) return;
   if (options_.spreading == Spreading::where_needed &&
@@ -755,7 +755,7 @@ void Bake::spread_where_needed(int ranks) {
                              text_of(*spread_, false)));
 }
 
-/// Whether a run of the same description was interrupted once it had fallen back.
+/// True if an interrupted run of the same description had already fallen back.
 bool Bake::has_fallen_back() {
   if (!plans_.compression || description_.form != StorageForm::automatic || options_.part || options_.discard)
     return false;
@@ -772,7 +772,7 @@ bool Bake::has_fallen_back() {
   return !team_.share(has ? "packed" : "").empty();
 }
 
-/// Goes on with every entry, where "auto" has found that compression is out of reach.
+/// Continues with every entry after "auto" has found compression out of reach.
 void Bake::fall_back(const std::string& why) {
   fell_back_ = why;
   progress_.line("note: compression = \"auto\" stores every entry of these Green's functions: " + why +
@@ -791,7 +791,7 @@ void Bake::fall_back(const std::string& why) {
   progress_.plan(std::move(stages));
 }
 
-/// All of the model that is known before the columns. False when interrupted.
+/// Computes everything in the model that precedes the columns. Returns false if interrupted.
 bool Bake::describe() {
   stored_as_ = plans_.compression ? plans_.compression->stored
                                   : number_stored(*solver_, stiffness_, model_.dimension());
@@ -817,7 +817,7 @@ bool Bake::describe() {
   return true;
 }
 
-/// Whether an interrupted run has left what comes before the columns.
+/// Takes over the results that precede the columns from an interrupted run; returns true if there are any.
 bool Bake::take_up() {
   if (options_.part || options_.join || options_.discard) return false;
   std::optional<Precision> left;
@@ -853,7 +853,7 @@ BakeResult Bake::describe_and_solve() {
       open_writer(options_, part_, model_, precision_, fell_back_.empty(), team_);
   model_.overlay = {};  // written by now
   model_.dynamics = {};
-  ::malloc_trim(0);  // workspaces are too large for what is left free by small things
+  ::malloc_trim(0);  // workspaces are too large for the gaps that small allocations leave
   std::optional<Solved> solved;
   try {
     solved = solve(*writer);

@@ -86,7 +86,7 @@ void write_report(const std::filesystem::path& file, const std::vector<std::stri
   }
 }
 
-// getrusage counts what the caller had before it started this program.
+// getrusage includes the memory of the caller before it started this program.
 std::int64_t peak_memory() {
   std::ifstream status("/proc/self/status");
   std::string word;

@@ -1,4 +1,4 @@
-// What bakes did, as JSON.
+// Reports of bakes as JSON.
 #pragma once
 
 #include <filesystem>
@@ -9,25 +9,25 @@
 
 namespace palpate {
 
-/// How a run as a whole was done.
+/// Figures of a run as a whole.
 struct RunFigures {
   int ranks = 1;
-  int jobs = 1;                             ///< threads of a rank
-  double seconds = 0.0;                     ///< of wall time
+  int jobs = 1;                             ///< threads per rank
+  double seconds = 0.0;                     ///< wall time [s]
   std::vector<std::int64_t> peak_memory{};  ///< of each rank [byte]
 };
 
-/// "done", "part", "planned" or "interrupted".
+/// Name of a result: "done", "part", "planned" or "interrupted".
 [[nodiscard]] std::string name_of(BakeResult result);
 
-/// A bake's entry of a report, JSON in one line.
+/// Entry of a bake in a report, JSON on one line.
 [[nodiscard]] std::string json_text_of(const BakeSummary& bake);
 
-/// Writes the report, with entries of bakes, to a file, a pipe, or with "-" to standard output. Throws Error.
+/// Writes a report with the entries of bakes to a file, a pipe, or for "-" to standard output. Throws Error.
 void write_report(const std::filesystem::path& file, const std::vector<std::string>& bakes,
                   const RunFigures& run);
 
-/// Most memory that this process has had [byte].
+/// Peak memory of this process [byte].
 [[nodiscard]] std::int64_t peak_memory();
 
 }  // namespace palpate

@@ -26,7 +26,7 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRang
                    const std::function<bool()>& interrupted) {
   const std::string name = column_stage(matrix);
   std::vector<Tile> tiles;
-  std::int64_t kept = 0;  // columns that an earlier, unfinished run has left
+  std::int64_t kept = 0;  // columns of an earlier, unfinished run
   double cost = 0.0;
   for (const Tile& tile : column_tiles(solver, plan)) {
     if (tile.first < part.first || tile.first >= part.end) continue;

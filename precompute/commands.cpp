@@ -30,7 +30,7 @@
 namespace palpate {
 namespace {
 
-/// "3/16"; nothing when it is no part.
+/// Reads "3/16"; nullopt if it is no part.
 std::optional<PartNumber> read_part_number(const std::string& text) {
   PartNumber part;
   const char* const end = text.data() + text.size();
@@ -58,7 +58,7 @@ void add_jobs(CLI::App& command, BakeOptions& options) {
       ->check(CLI::Range(1, 1024));
 }
 
-/// The command by which a baked body is touched.
+/// Command to touch a baked body.
 std::string to_touch(const std::string& file, bool has_greens) {
   return has_greens ? "palpate-runtime play " + shell_word(file) + " --view"
                     : "palpate-runtime push " + shell_word(file);
@@ -102,7 +102,7 @@ std::string next_steps(const BakeSummary& bake) {
 
 namespace {
 
-/// Whether the output is what the bake of this description would make, by its text and its source files.
+/// True if the output matches the bake of this description, by its text and its source files.
 bool is_done(const Description& description, const std::filesystem::path& output) {
   if (!std::filesystem::exists(output)) return false;
   try {
@@ -113,7 +113,7 @@ bool is_done(const Description& description, const std::filesystem::path& output
   }
 }
 
-/// Bakes it, unless that is not wanted where nothing has changed.
+/// Bakes a model, unless `unless_done` and nothing has changed.
 BakeSummary bake_or_keep(const std::string& model, const BakeOptions& options, bool unless_done) {
   if (unless_done) {
     check_is_description(model);
@@ -158,7 +158,7 @@ int run_compare(const std::string& a, const std::string& b, const CompareOptions
   return exit_ok;
 }
 
-/// As they were written.
+/// Arguments as typed.
 struct Arguments {
   std::string model, file, other_file, part;
   BakeOptions bake;
@@ -294,7 +294,7 @@ CLI::App* add_index_command(CLI::App& app, Arguments& arguments) {
   return command;
 }
 
-/// What to do instead, where a usage error shows it.
+/// Hint for a usage error.
 std::string usage_hint(const CLI::App& app, const std::string& first_word) {
   const bool of_help = app.got_subcommand("help");
   if (!app.get_subcommands().empty() && !of_help) {

@@ -1,4 +1,4 @@
-// The command line of palpate-precompute, and what that of its ranks shares with it.
+// Command line of palpate-precompute, and the parts that its ranks use too.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,16 +9,16 @@
 
 namespace palpate {
 
-/// Does what the command line says, and returns the exit status. Throws Error.
+/// Runs the command line and returns the exit status. Throws Error.
 int run_commands(int argc, char** argv);
 
-/// Adds the options of a bake, of one machine or of ranks.
+/// Adds the options of a bake, for one machine or for ranks.
 void add_bake_options(CLI::App& app, BakeOptions& options);
 
-/// Bakes a description's file. The defaults of output and jobs are filled in. Throws Error.
+/// Bakes a description's file. Fills in the defaults of output and jobs. Throws Error.
 BakeSummary bake_model(const std::string& model, BakeOptions options, Team& team);
 
-/// What a person may do next, lines.
+/// Suggested next commands, as lines.
 std::string next_steps(const BakeSummary& bake);
 
 }  // namespace palpate

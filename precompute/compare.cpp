@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t observed_places = 200;  // where the displacement fields are compared
+constexpr std::size_t observed_places = 200;  // at which the displacement fields are compared
 
 struct Extent3 {
   Vec3 low, high;
@@ -45,7 +45,7 @@ void check_same_body(const Model& a, const Model& b) {
   }
 }
 
-/// `count` of the nodes, spread: each the farthest from those before it, the first the first.
+/// `count` of the nodes, spread out: starting with the first, each is the farthest from all before it.
 std::vector<Index> spread(const Model& model, const std::vector<Index>& nodes, std::size_t count) {
   std::vector<Index> chosen;
   std::vector<double> distance(nodes.size(), INFINITY);
@@ -67,7 +67,7 @@ double median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2.0;
 }
 
-/// A place of the first file where a tip lies on the free boundary of both.
+/// True if a tip at this place of the first file lies on the free boundary of both.
 bool is_common(const Model& a, const TouchedBoundary& on_b, Index node, double radius) {
   const Vec3& x = a.mesh.nodes[static_cast<std::size_t>(node)];
   return on_b.nearest(x).distance < std::max(radius, on_b.mean_edge());
@@ -102,7 +102,7 @@ Comparison compare(const Model& a, const Model& b, const CompareOptions& options
                           1.0 / on_b.compliance(tip_b, direction), 0.0};
     for (const Observed& at : observed) {
       if ((at.place - place).norm() < result.radius)
-        continue;  // under the tip the pressure is the mesh's own
+        continue;  // under the tip the pressure depends on the mesh
       const Vec3 u_a = touch.stiffness_a * on_a.displacement(at.on_a, tip_a, direction);
       const Vec3 u_b = touch.stiffness_b * on_b.displacement(at.on_b, tip_b, direction);
       touch.field_difference = std::max(touch.field_difference, (u_a - u_b).norm());

@@ -1,4 +1,4 @@
-// The same touches on two baked files of one body, for choosing element, mesh and precision.
+// Comparison of the same touches on two baked files of one body, for choosing element, mesh and precision.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,9 @@ struct CompareOptions {
       radius;  ///< of the finger tip [m]; 0: one node; empty: three mean edges of the coarser file
 };
 
-/// A round finger tip pressed against the boundary along its inward normal: the traction falls from its
-/// middle as 1 - (r/R)^2, which every mesh resolves to second order, where a single node's force has no limit
-/// (a point load is singular; theory.md section 4).
+/// A round finger tip pressed against the boundary along its inward normal. The traction falls from its
+/// middle as 1 - (r/R)^2, which every mesh resolves to second order; a single node's force has no limit (a
+/// point load is singular; theory.md section 4).
 struct TouchComparison {
   Vec3 place;          ///< node of the first file [m]
   double stiffness_a;  ///< force over the mean displacement under the tip [N/m]
@@ -33,11 +33,11 @@ struct Comparison {
   std::vector<TouchComparison> touches;
 };
 
-/// Throws Error when the files do not hold the same body (dimension, extent), and when their boundaries have
-/// no free place in common.
+/// Compares two files. Throws Error if they do not hold the same body (dimension, extent), or if their
+/// boundaries have no free place in common.
 Comparison compare(const Model& a, const Model& b, const CompareOptions& options);
 
-/// A table, then the median and the largest differences.
+/// Comparison as a table, with the median and the largest differences.
 std::string to_text(const Comparison& comparison);
 
 }  // namespace palpate

@@ -12,19 +12,20 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t many_nodes = 5000;  // from there on compressed
-constexpr double cut_of_tolerance = 0.2;   // where forces are likely to be off by half the tolerance
-constexpr double accepted = 0.65;    // of the tolerance: more touches than are measured find larger errors
-constexpr double finer = 0.6;        // the next cut, where touches are off by more
-constexpr double bound_share = 0.5;  // most that measured errors may have of the bound of a tick
+constexpr std::int64_t many_nodes = 5000;  // at least this many are compressed by default
+constexpr double cut_of_tolerance = 0.2;   // at which force errors are likely half the tolerance
+constexpr double accepted = 0.65;    // of the tolerance: touches beyond the measured ones have larger errors
+constexpr double finer = 0.6;        // factor of the next cut if errors are larger
+constexpr double bound_share = 0.5;  // largest allowed ratio of a measured error to the bound of a tick
 constexpr int most_cuts = 5;
 constexpr std::uint64_t certificate_seed = 41;
-constexpr std::int64_t touches = 64;        // of each number of nodes
-constexpr std::int64_t touch_matrices = 9;  // that each thread has of a touch, three of them twice as wide
-constexpr double typical_rank = 45.0;       // of the default tolerance (measured)
+constexpr std::int64_t touches = 64;              // per number of nodes
+constexpr std::int64_t touch_matrices = 9;        // per thread for a touch, three of them twice as wide
+constexpr double typical_rank = 45.0;             // for the default tolerance (measured)
 constexpr std::int64_t recompression_copies = 6;  // of the far part: skeletons are larger (measured)
 constexpr double far_share = 2.5;                 // of the time of near pairs (measured)
-constexpr double touch_share = 1.6;               // of that of as many columns of near pairs (measured)
+constexpr double touch_share = 1.6;               // relative to the time of equally many columns of near
+                                                  // pairs (measured)
 
 constexpr const char* near_stage = "near pairs";
 constexpr const char* sample_stage = "random loads";
@@ -37,7 +38,7 @@ constexpr const char* name_of(CompressionStage stage) {
                                               : far_stage;
 }
 
-/// The dofs of nodes in another order.
+/// Numbering of the nodes in another order.
 StoredNumbering reordered(const StoredNumbering& stored, const std::vector<Index>& order) {
   const std::size_t d = stored.dofs.size() / stored.nodes.size();
   StoredNumbering result;
@@ -59,7 +60,7 @@ std::vector<double> table_of(const std::vector<TouchErrors>& errors) {
   return table;
 }
 
-/// Makes the bound of a tick so large that measured errors are no more than bound_share of it.
+/// Enlarges the bound of a tick until measured errors are at most bound_share of it.
 void loosen_bound(HierarchicalMatrix& matrix, std::vector<TouchErrors>& errors) {
   double largest = 0.0;
   for (const TouchErrors& e : errors) largest = std::max(largest, e.largest_bound_share());

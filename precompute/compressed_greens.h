@@ -1,4 +1,4 @@
-// Green's functions in nested low-rank form: when, what they take, and how they are made and judged.
+// Green's functions in nested low-rank form: decision, plan, compression and certificate.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +20,18 @@
 
 namespace palpate {
 
-/// Stored nodes in the order of a file: mesh node of each, and dof of K of each of their dofs, -1 where held.
+/// Stored nodes in the order of a file: the mesh node of each, and the dof of K of each of their dofs, -1 if
+/// held.
 struct StoredNumbering {
   std::vector<Index> nodes;
   std::vector<std::int64_t> dofs;
 };
 
-/// Whether the description asks for compressed Green's functions of so many nodes. Throws Error where it asks
-/// for what does not go together.
+/// True if the description asks for compressed Green's functions with so many nodes. Throws Error for
+/// contradictory settings.
 bool wants_compression(const Description& description, std::int64_t stored_nodes);
 
-/// What is decided before anything is solved.
+/// Plan of a compression, made before anything is solved.
 struct CompressionPlan {
   ClusteredNodes clusters;
   StoredNumbering stored;         ///< in the order of the clusters
@@ -41,32 +42,32 @@ struct CompressionPlan {
   double near_seconds = 0.0, sample_seconds = 0.0, far_seconds = 0.0, touch_seconds = 0.0;  ///< estimates
 };
 
-/// `model`: mesh, surface and held nodes. `factor` may be only analysed. `dense` is the plan of all columns,
-/// of which the rate of this machine is taken.
+/// Plans a compression. `model`: mesh, surface and held nodes. `factor` may be only analysed. `dense` is the
+/// plan of all columns, which has this machine's rate.
 CompressionPlan plan_compression(const Description& description, const Model& model,
                                  const StoredNumbering& stored, const Factor& factor, const Plan& dense,
                                  int jobs);
 
-/// The stages of `compress_greens`, with the seconds that they are expected to take.
+/// Stages of `compress_greens`, with the expected seconds.
 std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks = 1);
 
-/// Leaves of near pairs, whose cost is the number of their entries.
+/// Leaves of near pairs; their cost is the number of their entries.
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame);
 
-/// How the Green's functions of a plan are made.
+/// Compression of the Green's functions of a plan.
 class GreensCompressor {
  public:
-  /// All are kept by reference.
+  /// Keeps references to all arguments.
   GreensCompressor(const CompressionPlan& plan, const Factor& factor, Team& team, int jobs,
                    Progress& progress, std::function<bool()> interrupted);
 
   /// Solves for the near pairs of the leaves of `part` that the writer does not have yet, and writes them.
-  /// Adds to `counts`. False when interrupted.
+  /// Adds to `counts`. Returns false if interrupted.
   bool solve_near(const PieceRange& part, ModelWriter& writer, TileCounts& counts);
 
-  /// Makes the matrix, in all processes, with the near pairs of the file, which has all, and measures random
-  /// touches; where their forces are off by more than the tolerance, again with more terms. Null when
-  /// interrupted. Throws OutOfReach, in all processes, where the tolerance is.
+  /// Computes the matrix, in all processes, from the near pairs of the file, which must be complete, and
+  /// measures random touches; if their force errors exceed the tolerance, repeats with more terms. Returns
+  /// null if interrupted. Throws OutOfReach, in all processes, if the tolerance cannot be met.
   std::shared_ptr<const HierarchicalMatrix> compress(ModelWriter& writer);
 
  private:
@@ -78,11 +79,11 @@ class GreensCompressor {
   Progress& progress_;
   std::function<bool()> interrupted_;
   TeamSharing sharing_;
-  const char* stage_ = nullptr;  // under way
+  const char* stage_ = nullptr;  // current stage
   Compression compression_;
 };
 
-/// The certificate as a table, a line for each number of nodes.
+/// Certificate as a table, one line per number of nodes.
 std::string certificate_text(const HierarchicalMatrix& matrix);
 
 }  // namespace palpate

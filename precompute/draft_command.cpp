@@ -23,7 +23,7 @@ void tell(const std::string& line) {
   say(stderr, "{}\n", line);
 }
 
-/// "-100:200"; nothing where it is no range.
+/// Reads "-100:200"; nullopt if it is no range.
 std::optional<ValueRange> read_range(const std::string& text) {
   ValueRange range{};
   const char* const end = text.data() + text.size();
@@ -107,7 +107,7 @@ CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments) {
 
 void check_draft_options(const std::string& model, const DraftArguments& arguments) {
   const bool any = arguments.given() || !arguments.element.empty();
-  if (any && !shape_kind(model)) check_is_description(model);  // says what it is
+  if (any && !shape_kind(model)) check_is_description(model);  // reports the kind of file
   if (!arguments.range.empty() && shape_kind(model) != ShapeKind::image)
     throw CLI::ValidationError("--range", "it is for an image, and '" + model + "' is none by its name");
   if (!any || shape_kind(model) || (!arguments.given() && !std::filesystem::exists(model))) return;

@@ -1,4 +1,4 @@
-// What the command line of palpate-precompute says of a surface or an image.
+// Command line of palpate-precompute for a surface or an image.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// As they were written.
+/// Arguments as typed.
 struct DraftArguments {
   std::string unit;
   std::string parts;
@@ -18,25 +18,25 @@ struct DraftArguments {
   bool renew = false;
   std::optional<int> nodes{};
 
-  [[nodiscard]] bool given() const;  ///< any that is for a new description alone
+  [[nodiscard]] bool given() const;  ///< true if any of them applies to new descriptions only
 };
 
 /// Adds the options of a draft.
 void add_draft_options(CLI::App& app, DraftArguments& arguments);
 
-/// Adds `new`, which asks for a `file` that is not given.
+/// Adds the command `new`, which asks for the `file` if it is not given.
 CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments);
 
-/// Throws CLI::ParseError where they are given for something else than a surface or an image.
+/// Throws CLI::ParseError if they are given for anything but a surface or an image.
 void check_draft_options(const std::string& model, const DraftArguments& arguments);
 
-/// A description of `model`: itself, or where it is a surface or an image the one that is drafted beside it,
-/// with each decision told on the error stream; with `keep` no file that is there is replaced. Where the
-/// folder of `model` may only be read, it is drafted beside the `output`. Throws Error.
+/// Description of `model`: itself or, for a surface or an image, the one drafted beside it, with each
+/// decision printed on the error stream; with `keep` no existing file is replaced. If the folder of `model`
+/// is read-only, it is drafted beside the `output`. Throws Error.
 std::string described(const std::string& model, const DraftArguments& arguments, bool keep,
                       const std::filesystem::path& output);
 
-/// `new`: asks on the terminal or takes answers from a pipe, and names the next step. Returns the exit
+/// Runs `new`: asks on the terminal or takes answers from a pipe, and prints the next step. Returns the exit
 /// status; throws Error.
 int run_new(const std::string& file, const DraftArguments& arguments);
 

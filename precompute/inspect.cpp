@@ -55,7 +55,7 @@ std::string analysis_text(const Model& model) {
   return "unknown";
 }
 
-/// One line a material.
+/// One line per material.
 std::string materials_text(const Model& model) {
   std::vector<std::int64_t> elements(model.materials.size(), 0);
   for (const Index material : model.material_of_element) ++elements[static_cast<std::size_t>(material)];
@@ -77,7 +77,7 @@ std::string materials_text(const Model& model) {
   return text;
 }
 
-/// The smooth part and the force errors that were measured.
+/// Text on the smooth part and the measured force errors.
 std::string precision_text(const Model& model) {
   std::string text;
   if (const SmoothPart* smooth = model.greens.smooth().get(); smooth != nullptr)
@@ -108,7 +108,7 @@ std::string compressed_text(const Model& model) {
       matrix.tolerance, certificate_text(matrix));
 }
 
-/// Nothing where none are stored.
+/// Text on stored overlays; empty if there are none.
 std::string overlay_text(const Model& model) {
   const StoredOverlay& overlay = model.overlay;
   if (overlay.refinement == 0) return "";
@@ -120,13 +120,13 @@ std::string overlay_text(const Model& model) {
                      8e-6 * static_cast<double>(entries));
 }
 
-/// A share in per cent; "none" where there is none.
+/// A ratio in per cent; "none" if there is none.
 std::string percent_text(double share, bool is_signed) {
   if (!std::isfinite(share)) return "none";
   return is_signed ? fmt::format("{:+.1f} %", 100.0 * share) : fmt::format("{:.1f} %", 100.0 * share);
 }
 
-/// Nothing where the body was not bent.
+/// Text on the study of warping; empty if there is none.
 std::string warp_text(const Model& model) {
   const WarpStudy& study = model.warp;
   if (!study.any()) return "";
@@ -144,13 +144,13 @@ std::string warp_text(const Model& model) {
   return text;
 }
 
-/// Damping a M + b K in words.
+/// Text on damping a M + b K.
 std::string damping_text(const Rayleigh& damping) {
   if (damping.mass == 0.0 && damping.stiffness == 0.0) return "no damping";
   return fmt::format("damping {:.4g}/s M + {:.4g} s K", damping.mass, damping.stiffness);
 }
 
-/// Nothing where the body does not swing.
+/// Text on dynamics; empty if there are none.
 std::string dynamics_text(const Model& model) {
   const StoredDynamics& dynamics = model.dynamics;
   if (dynamics.method == DynamicsMethod::none) return "";
@@ -177,7 +177,7 @@ std::string dynamics_text(const Model& model) {
                             dynamics.lumped ? "lumped" : "consistent", damping_text(dynamics.damping));
 }
 
-/// The largest displacement at rest and the force that the loads put on the body in all.
+/// Text on the largest displacement at rest and the total force of the loads.
 std::string rest_text(const Model& model) {
   Vec3 total = Vec3::Zero();
   double largest = 0.0;

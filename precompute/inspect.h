@@ -1,4 +1,4 @@
-// `palpate-precompute inspect`: what is in a file.
+// `palpate-precompute inspect`: the contents of a file.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// palpate-precompute: from model.toml to NAME.palpate.hdf, once a model.
+// palpate-precompute: from model.toml to NAME.palpate.hdf, once per model.
 #include "base/program.h"
 #include "precompute/commands.h"
 #include "precompute/machine/blas_room.h"

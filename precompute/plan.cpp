@@ -18,28 +18,28 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t max_block_columns = 192;
-// Where there is work for many threads, blocks are narrower, so that 2 048 threads find enough of them, and
-// of several widths, so that the threads of a node do not all write at once; narrow ones at the end let all
-// threads end together. Of 300 000 columns 2 048 threads then are busy for 93 % of the time: with 96 columns
-// everywhere for 74 %, with 192 for 45 % (scripts/studies/cluster).
+// If there is work for many threads, blocks are narrower, so that 2 048 threads find enough of them, and of
+// several widths, so that the threads of a node do not all write at once; narrow blocks at the end let all
+// threads finish together. With 300 000 columns 2 048 threads are then busy 93 % of the time; with 96 columns
+// everywhere 74 %, with 192 45 % (scripts/studies/cluster).
 constexpr std::array<std::int64_t, 4> widths_for_many = {84, 72, 60, 48};
 constexpr std::int64_t last_width_for_many = 24;
 constexpr double last_part_for_many = 0.2;  // of all columns
 constexpr double work_for_many = 1e12;      // multiplications and additions of all columns
 constexpr std::int64_t max_block_bytes = 512LL << 20;
 constexpr double sweep_efficiency =
-    0.4;  // of the sweeps against products alone: gathers and small supernodes (measured)
-constexpr double factor_efficiency = 0.5;     // of CHOLMOD's factorisation against them (measured)
+    0.4;  // sweeps relative to plain products: gathers and small supernodes (measured)
+constexpr double factor_efficiency = 0.5;     // CHOLMOD's factorisation relative to them (measured)
 constexpr double checksum_rate = 1e9;         // while the file is read back [byte/s]
-constexpr double solve_rate = 3.5e9;          // of one right-hand side [flop/s] (measured)
-constexpr double solves_for_precision = 900;  // of eight places of 30 nodes, and of the smooth part
-constexpr double solves_at_the_end = 4;       // of the probes
-constexpr double solves_per_mode = 5;  // of block Lanczos, its products of vectors among them (measured)
-constexpr double modes_alone = 0.4;    // share of that which each process does (measured)
-constexpr double overlay_seconds_per_byte = 1e-8;    // of patches of two rings (measured)
+constexpr double solve_rate = 3.5e9;          // for one right-hand side [flop/s] (measured)
+constexpr double solves_for_precision = 900;  // for eight places of 30 nodes, and the smooth part
+constexpr double solves_at_the_end = 4;       // for the probes
+constexpr double solves_per_mode = 5;         // in block Lanczos, its products of vectors included (measured)
+constexpr double modes_alone = 0.4;           // fraction of these that each process does (measured)
+constexpr double overlay_seconds_per_byte = 1e-8;    // for patches of two rings (measured)
 constexpr std::int64_t bytes_of_thread = 1'600'000;  // (measured)
 
-/// Multiply-adds a second of one thread in products shaped as the sweeps are.
+/// Multiply-adds per second of one thread in products of the sweeps' shape.
 double measured_flops_per_second() {
   constexpr int m = 192, n = 128, k = 24;
   const std::vector<double> A(std::size_t{m} * k, 1.0), B(std::size_t{k} * n, 1.0);
@@ -55,14 +55,14 @@ double measured_flops_per_second() {
   return flops / spent;
 }
 
-/// Columns a block: as wide as pays, but one block's right-hand sides stay below max_block_bytes. It depends
-/// on the model alone: products of other widths may differ in their last digits.
+/// Columns per block: as wide as pays off while the block's right-hand sides stay below max_block_bytes.
+/// Depends on the model alone: products of other widths may differ in their last digits.
 std::int64_t widest_block(std::int64_t free_dofs) {
   const std::int64_t fits = max_block_bytes / (free_dofs * static_cast<std::int64_t>(sizeof(double)));
   return std::clamp<std::int64_t>(fits / 24 * 24, 24, max_block_columns);
 }
 
-/// Columns of block number k where blocks are for many threads, the first of them being `first` of all.
+/// Columns of block k if blocks are for many threads; `first` is its first column of `all`.
 std::int64_t width_for_many(std::size_t k, std::int64_t first, std::int64_t all) {
   const bool last = static_cast<double>(all - first) <= last_part_for_many * static_cast<double>(all);
   return last ? last_width_for_many : widths_for_many[k % widths_for_many.size()];
@@ -75,7 +75,7 @@ double column_flops(const GreensSolver& solver, const Plan& plan) {
   return flops;
 }
 
-/// How many of `jobs` threads have a processor.
+/// Number of the `jobs` threads that have a processor.
 int working(int jobs) {
   return std::min(jobs, allotted_processors());
 }

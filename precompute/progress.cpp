@@ -13,11 +13,11 @@
 namespace palpate {
 namespace {
 
-constexpr double seconds_between_lines = 5.0;  // where lines cannot be rewritten ...
-constexpr double share_between_lines = 0.1;    // ... and of what the stage took so far
+constexpr double seconds_between_lines = 5.0;  // if lines cannot be rewritten ...
+constexpr double share_between_lines = 0.1;    // ... and fraction of the stage's time so far
 constexpr double seconds_between_rewrites = 1.0;
 
-/// Not by stdio, whose lock a child that is forked meanwhile would inherit.
+/// Without stdio, whose lock a child forked at this moment would inherit.
 void write_out(std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
@@ -26,7 +26,7 @@ void write_out(std::string_view text) {
   }
 }
 
-/// Signals are for the main thread, where they interrupt what waits.
+/// Starts a thread that receives no signals: these are for the main thread, whose waits they interrupt.
 template <class Work>
 std::jthread without_signals(Work&& work) {
   sigset_t all, before;

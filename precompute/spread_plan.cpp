@@ -11,15 +11,15 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t scalar = sizeof(double);
-// Of MUMPS with 30 % of work space, against the factor (measured on 1 to 8 ranks): fronts and contributions,
-// buffers for each doubling of the ranks, and what the rank with most has against the mean.
+// MUMPS with 30 % of work space, relative to the factor (measured on 1 to 8 ranks): fronts and contributions,
+// buffers for each doubling of the ranks, and the largest rank relative to the mean.
 constexpr double one_rank = 1.45, each_doubling = 0.3, uneven = 1.15;
-constexpr double solve_efficiency = 0.5;     // of sweeps together against those of a process alone
-constexpr double together_efficiency = 0.6;  // of factorising together
+constexpr double solve_efficiency = 0.5;     // of joint sweeps relative to those of a single process
+constexpr double together_efficiency = 0.6;  // of joint factorisation
 constexpr double paths = 1.5;                // loads are swept to the root and back through all of the factor
 constexpr std::int64_t solution_copies = 3;  // of a block in the leader: gathered, by rows, by columns
-constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
-constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
+constexpr std::int64_t touched_columns = 90;  // for a place that the precision is chosen by
+constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, all in long double
 
 }  // namespace
 
@@ -41,7 +41,7 @@ void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, in
   plan.workspace_bytes = K_bytes + std::max(blocks, touches);
   const double all = plan.flops;
   plan.flops = paths * 2.0 * static_cast<double>(plan.factor_entries) * static_cast<double>(plan.stored_dofs);
-  plan.seconds *= plan.flops / std::max(all, 1.0) / solve_efficiency;  // of one process
+  plan.seconds *= plan.flops / std::max(all, 1.0) / solve_efficiency;  // of a single process
   plan.factor_seconds /= together_efficiency * ranks * jobs;
   plan.precision_seconds /= solve_efficiency * ranks;
 }

@@ -14,7 +14,7 @@ PieceRange share_of(const std::vector<Tile>& tiles, std::int64_t number, std::in
   bool begun = false;
   double before = 0.0;
   for (const Tile& tile : tiles) {
-    // A tile is of the share in which its middle lies.
+    // A tile belongs to the part that contains its middle.
     const double middle = whole > 0.0 ? (before + 0.5 * tile.cost) / whole : 0.0;
     before += tile.cost;
     const std::int64_t of =

@@ -1,4 +1,4 @@
-// Who shares the columns of a bake: threads of this process, or of others too.
+// Threads and processes among which the columns of a bake are divided.
 #pragma once
 
 #include <cstdint>
@@ -21,20 +21,21 @@ struct Tile {
   double cost = 0.0;  ///< in any unit
 };
 
-/// Tiles next to each other that are number `number` of `parts` shares, from 1, of about the same cost.
+/// Part `number` of `parts` (from 1) of the tiles: adjacent tiles, with parts of about the same cost.
 PieceRange share_of(const std::vector<Tile>& tiles, std::int64_t number, std::int64_t parts);
 
-/// How many tiles were solved, and how many an earlier run has left.
+/// Numbers of tiles solved now, and kept from an earlier run.
 struct TileCounts {
   std::int64_t solved = 0;
   std::int64_t kept = 0;
 };
 
-/// What is done with tiles.
+/// Callbacks for tiles.
 struct TileWork {
-  std::function<void(const Tile&, int worker)> solve;  ///< by any thread, `worker` in [0, jobs)
-  std::function<void(const Tile&)> done;               ///< by the leader after each, one at a time
-  std::function<bool()> interrupted;                   ///< no more tiles are begun
+  std::function<void(const Tile&, int worker)> solve;  ///< called by any thread, `worker` in [0, jobs)
+  std::function<void(const Tile&)> done;               ///< called by the leader after each tile, one at a
+                                                       ///< time
+  std::function<bool()> interrupted;                   ///< true: no more tiles are begun
 };
 
 /// The processes of one bake. All make the same calls in the same order.
@@ -45,41 +46,41 @@ class Team {
   Team(const Team&) = delete;
   Team& operator=(const Team&) = delete;
 
-  /// Whether this process prints, writes what is no tile, and seals.
+  /// True if this process prints, writes everything except tiles, and completes the file.
   [[nodiscard]] virtual bool leads() const { return true; }
 
-  /// Whether this process tells of its progress.
+  /// True if this process reports its progress.
   [[nodiscard]] virtual bool prints() const { return leads(); }
-  /// Number of this process, how many there are, and how many on this machine.
+  /// Number of this process; number of all processes, and of those on this machine.
   [[nodiscard]] virtual int rank() const { return 0; }
   [[nodiscard]] virtual int size() const { return 1; }
   [[nodiscard]] virtual int size_here() const { return 1; }
-  /// Threads where none are asked for.
+  /// Number of threads if none is requested.
   [[nodiscard]] virtual int default_jobs() const { return allotted_processors(); }
 
-  /// Solves the leader's tiles with `jobs` threads of each process, in their order, and returns in all once
-  /// all are done. False, in all, when one was interrupted.
+  /// Solves the leader's tiles with `jobs` threads of each process, in order, and returns in all processes
+  /// once all tiles are done. Returns false, in all, if one was interrupted.
   virtual bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work);
 
-  /// Whether there are others that can hold a part of a factor each.
+  /// True if there are other processes that can each hold a part of a factor.
   [[nodiscard]] virtual bool can_spread() const { return false; }
 
-  /// The numbers of a factor of K, which is analysed, over the processes. `jobs`: threads of each. Throws
-  /// Error.
+  /// Distributes the numbers of a factor of K over the processes. `analysed`: factor of K, analysed. `jobs`:
+  /// threads of each process. Throws Error.
   [[nodiscard]] virtual std::unique_ptr<SpreadNumbers> spread(const SparseMatrix& K, const Factor& analysed,
                                                               int jobs);
 
-  /// Whether any process says so.
+  /// True if `here` is true in any process.
   virtual bool any(bool here) { return here; }
 
-  /// The leader's text.
+  /// The leader's text, in all processes.
   virtual std::string share(std::string text) { return text; }
 
-  /// Gives `take` the bytes of each other process, by rank.
+  /// Passes the bytes of each other process to `take`, by rank.
   virtual void exchange(const std::string& /*bytes*/, const std::function<void(std::string_view)>& /*take*/) {
   }
 
-  /// Gives the leader, before the tile that is being solved counts as done, a line for its `listen`.
+  /// Sends the leader a line for its `listen`, before the tile being solved counts as done.
   virtual void tell(const std::string& line) { listener_(line); }
   void listen(std::function<void(const std::string&)> listener) { listener_ = std::move(listener); }
 

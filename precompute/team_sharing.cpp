@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-// Small items go together, so that no more than these are drawn, or these by each thread.
+// Small items are combined, so that at most this many tiles, or this many per thread, are drawn.
 constexpr std::int64_t most_tiles = 4096, most_of_thread = 16;
 
 std::vector<Tile> tiles_of(std::int64_t items, std::int64_t threads) {

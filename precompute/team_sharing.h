@@ -1,4 +1,4 @@
-// Work that the processes of a bake share, and whose results all of them need.
+// Work divided among the processes of a bake, all of which need the results.
 #pragma once
 
 #include <functional>
@@ -8,10 +8,10 @@
 
 namespace palpate {
 
-/// The threads of all processes of a team, which take items as they have time.
+/// Threads of all processes of a team, which take items as they become free.
 class TeamSharing : public Sharing {
  public:
-  /// `jobs`: threads of each process. No more items are begun once `interrupted` in any of them.
+  /// `jobs`: threads of each process. No more items are begun once any process is `interrupted`.
   TeamSharing(Team& team, int jobs, std::function<bool()> interrupted)
       : team_(team), jobs_(jobs), interrupted_(std::move(interrupted)) {}
 

@@ -5,10 +5,10 @@
 namespace palpate {
 namespace {
 
-// Of all planned seconds: how much of the expectation weighs against what is measured.
+// Weight of the expectation against measurements, relative to all planned seconds.
 constexpr double weight_of_plan = 0.01;
 constexpr double measured_from = 0.1;
-// A stage that should be over is believed to go on for this share of the time by which it is late.
+// A stage that is overdue is expected to take this fraction of its delay longer.
 constexpr double overdue = 0.5;
 
 }  // namespace
@@ -65,7 +65,7 @@ double TimeLeft::seconds(double now) const noexcept {
   if (!known()) return 0.0;
   const Stage& stage = stages_[at_];
   const double slow = slowness();
-  // Of the stage under way its own shares tell most: rates of stages differ.
+  // For the current stage its own progress says most: rates of stages differ.
   const double weight = weight_of_plan * stage.seconds;
   const double pace = weight + share_ * stage.seconds > 0.0 && share_ > 0.0
                           ? (weight * slow + reported_ - begun_) / (weight + share_ * stage.seconds)

@@ -1,4 +1,4 @@
-// How long a run of several stages still takes.
+// Estimate of the time left of a run of several stages.
 #pragma once
 
 #include <cstddef>
@@ -8,49 +8,48 @@
 
 namespace palpate {
 
-/// What a run goes through, and the seconds that it is expected to take when nothing is measured yet.
+/// A stage of a run, with the seconds expected before anything is measured.
 struct Stage {
   std::string name;
   double seconds = 0.0;
 };
 
-/// Estimates the time left of a run from the expected seconds of its stages and from what is measured of
-/// them: the shares that a stage reports correct its own rest, all measured stages together the rest of the
-/// run. Has no clock: `now` are seconds since any fixed moment, never falling.
+/// Estimate of the time left of a run from the expected seconds of its stages and from measurements: the
+/// reported progress of a stage corrects its own rest, all measured stages together the rest of the run. Has
+/// no clock: `now` are seconds since any fixed moment, never decreasing.
 class TimeLeft {
  public:
-  /// The stages that are to come, in order.
+  /// Sets the stages to come, in order.
   void plan(std::vector<Stage> stages);
 
-  /// Corrects the expected seconds of a planned stage, as long as it has not begun. Unknown names are passed
-  /// over.
+  /// Corrects the expected seconds of a planned stage that has not begun. Unknown names are ignored.
   void expect(std::string_view stage, double seconds);
 
-  /// A planned stage begins: it and what follows is left. A name that is not planned changes nothing.
+  /// Begins a planned stage; it and the following ones are left. A name that is not planned has no effect.
   void begin(std::string_view stage, double now);
 
-  /// The stage under way has done this share (0..1) of its work.
+  /// Reports the finished fraction (0..1) of the current stage.
   void reach(double share, double now);
 
-  /// Whether stages were planned.
+  /// True if stages were planned.
   [[nodiscard]] bool known() const noexcept { return !stages_.empty(); }
 
-  /// Whether the rest was measured rather than expected: a tenth of all planned seconds is done.
+  /// True if the rest is measured rather than expected: a tenth of all planned seconds is done.
   [[nodiscard]] bool measured() const noexcept;
 
-  /// Seconds left of the stage under way and of all that follow.
+  /// Seconds left of the current stage and all that follow.
   [[nodiscard]] double seconds(double now) const noexcept;
 
  private:
   [[nodiscard]] double planned() const noexcept;   // seconds of all stages
-  [[nodiscard]] double slowness() const noexcept;  // measured seconds for an expected one
+  [[nodiscard]] double slowness() const noexcept;  // measured seconds per expected one
 
   std::vector<Stage> stages_;
-  std::size_t at_ = 0;      // the stage under way ...
+  std::size_t at_ = 0;      // current stage ...
   bool under_way_ = false;  // ... once it has begun
-  double begun_ = 0.0;      // when it began [s]
-  double share_ = 0.0;      // of it that is done ...
-  double reported_ = 0.0;   // ... as of then [s]
+  double begun_ = 0.0;      // its start [s]
+  double share_ = 0.0;      // finished fraction of it ...
+  double reported_ = 0.0;   // ... at this time [s]
   double expected_ = 0.0;   // seconds of finished stages, as planned ...
   double spent_ = 0.0;      // ... and as measured
 };

@@ -26,9 +26,9 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-constexpr double warp_bound = 1e-3;  // what is searched for is found to 1e-5, by steps that rounding may turn
+constexpr double warp_bound = 1e-3;  // searched values are found to 1e-5, by steps that rounding may change
 
-/// A f, as it is stored.
+/// A f, for A as stored.
 template <class T>
 Vector multiply(std::span<const T> packed, const Vector& f) {
   Vector u = Vector::Zero(f.size());
@@ -60,8 +60,8 @@ double relative_error(const Vector& value, const Vector& reference) {
   return (value - reference).lpNorm<Eigen::Infinity>() / reference.lpNorm<Eigen::Infinity>();
 }
 
-/// What the numbers of a file may be wrong by: the rounding of a stored entry, with a margin for sums over
-/// many, and for `probe`, which hangs on the condition of K, what solves are wrong by.
+/// Bounds of the errors of a file's numbers: the rounding of a stored entry, with a margin for long sums, and
+/// for `probe`, which depends on the condition of K, the error of solves.
 struct Bounds {
   double probe, residual;
   Bounds(Precision precision, double solver)
@@ -69,7 +69,7 @@ struct Bounds {
         residual(has_float_entries(precision) ? 1e-6 : 1e-12) {}
 };
 
-/// |K| |u| of the lower triangle K.
+/// |K| |u|, from the lower triangle K.
 Vector absolute_product(const SparseMatrix& K, const Vector& u) {
   Vector product = Vector::Zero(u.size());
   for (std::int64_t j = 0; j < K.cols(); ++j) {
@@ -81,8 +81,8 @@ Vector absolute_product(const SparseMatrix& K, const Vector& u) {
   return product;
 }
 
-/// K split by stored (b) and other (a) free dofs, to condense a stored column exactly: u_a = -K_aa^-1 K_ab
-/// u_b.
+/// K split into stored (b) and other (a) free dofs, which completes a stored column exactly: u_a = -K_aa^-1
+/// K_ab u_b.
 class Condensation {
  public:
   Condensation(const Stiffness& stiffness, std::span<const std::int64_t> stored_dofs)
@@ -107,7 +107,7 @@ class Condensation {
     }
     K_aa_.resize(static_cast<std::int64_t>(other_.size()), static_cast<std::int64_t>(other_.size()));
     K_aa_.setFromTriplets(entries.begin(), entries.end());
-    std::vector<std::int64_t> node_start;  // nodes are stored whole or not at all
+    std::vector<std::int64_t> node_start;  // all dofs of a node are stored, or none
     for (const std::int64_t first : stiffness.node_start) {
       if (first == K_.rows()) break;
       if (!is_stored_[static_cast<std::size_t>(first)]) {
@@ -119,7 +119,7 @@ class Condensation {
     factor_->factorize();
   }
 
-  /// Fills in the other dofs of u, in which they are zero.
+  /// Computes the other dofs of u, which are zero on entry.
   void complete(Vector& u) const {
     if (other_.empty()) return;
     const Vector f = K_.selfadjointView<Eigen::Lower>() * u;
@@ -132,7 +132,7 @@ class Condensation {
  private:
   const SparseMatrix& K_;
   std::vector<std::uint8_t> is_stored_;
-  std::vector<std::int64_t> other_;  // the dofs that are not stored, ascending
+  std::vector<std::int64_t> other_;  // dofs that are not stored, ascending
   SparseMatrix K_aa_;
   std::unique_ptr<Factor> factor_;
 };
@@ -150,7 +150,7 @@ std::vector<Check> check_probes(const Model& model, const Bounds& bounds) {
   return {probes, energy};
 }
 
-/// K times some stored columns, the other dofs filled in.
+/// Checks K times some stored columns, completed by the other dofs.
 Check check_residual(const Model& model, const Stiffness& stiffness,
                      std::span<const std::int64_t> stored_dofs, double bound, int samples) {
   const Condensation condensation(stiffness, stored_dofs);
@@ -176,7 +176,7 @@ Check check_residual(const Model& model, const Stiffness& stiffness,
   return residual;
 }
 
-/// The rest state against the loads: K u0 = f on the free dofs, by products of the elements alone.
+/// Checks the rest state against the loads: K u0 = f on the free dofs, by products of the elements alone.
 Check check_rest_state(const Model& model, const Stiffness& stiffness) {
   const int d = model.dimension();
   Vector u(static_cast<Eigen::Index>(stiffness.free_dofs.size())), f(u.size());
@@ -189,13 +189,13 @@ Check check_rest_state(const Model& model, const Stiffness& stiffness) {
   const Vector r = stiffness.K.selfadjointView<Eigen::Lower>() * u - f;
   const double scale = f.lpNorm<Eigen::Infinity>();
   if (scale == 0.0) return {"rest state", r.lpNorm<Eigen::Infinity>(), 1e-8};
-  // What K u0 is rounded by counts where it is made of much larger numbers than f.
+  // The rounding of K u0 counts if K u0 is a difference of much larger numbers than f.
   const double rounding = 100.0 * std::numeric_limits<double>::epsilon() *
                           absolute_product(stiffness.K, u).lpNorm<Eigen::Infinity>() / scale;
   return {"rest state", r.lpNorm<Eigen::Infinity>() / scale, 1e-8 + rounding};
 }
 
-/// A study of warping against a new one, under the forces that it says.
+/// Checks a study of warping against a new one under the same forces.
 Check check_warp_study(const Model& model) {
   const WarpStudy &stored = model.warp, found = repeat_warp_study(model);
   Check check{"warping", found.force.size() == stored.force.size() ? 0.0 : 1.0, warp_bound};
@@ -212,7 +212,7 @@ Check check_warp_study(const Model& model) {
   return check;
 }
 
-/// What the file has that is neither what its description nor what its HDF5 says.
+/// Contents of the file that match neither its description nor its HDF5 part.
 std::vector<std::string> differences_of(const Model& model, const std::filesystem::path& file) {
   std::vector<std::string> differences = description_differences(model, file);
   if (!is_index_right(file))

@@ -1,4 +1,4 @@
-// `palpate-precompute verify`: whether a file still says what K says.
+// `palpate-precompute verify`: comparison of a file with a newly assembled K.
 #pragma once
 
 #include <filesystem>
@@ -12,13 +12,13 @@ namespace palpate {
 
 struct VerifyReport {
   std::vector<Check> checks;
-  std::vector<std::string> differences;  ///< fields that are not what /model_toml says; a wrong index
+  std::vector<std::string> differences;  ///< fields that do not match /model_toml; a wrong index
   std::vector<std::string> stale;        ///< sources that have changed since
-  std::vector<std::string> warnings;     ///< of what is as it was baked, but not good
+  std::vector<std::string> warnings;     ///< on data that are as baked, but poor
   [[nodiscard]] bool passed() const noexcept;
 };
 
-/// Checks a loaded model (loading has proved sizes, ranges and checksums):
+/// Checks a loaded model (loading has checked sizes, ranges and checksums):
 /// - probes: Xi f = u for each stored pair, every entry of Xi taking part; error |Xi f - u|_max / |u|_max;
 /// - energy: f^T Xi f > 0 and equal to f^T u;
 /// - columns, rows and touches against K solved anew from the stored mesh: see verify_matrix;
@@ -26,14 +26,14 @@ struct VerifyReport {
 /// section 2), as normwise backward error
 ///   |K u - e|_max / (|K|_inf |u|_max + 1);
 /// - rest state: K u0 = f on the free dofs, held ones as prescribed: |K u0 - f|_max / |f|_max;
-/// - of dynamics: see verify_dynamics;
+/// - dynamics: see verify_dynamics;
 /// - a study of warping against a new one under the same forces: the largest difference of rotations and
 /// errors;
-/// - all fields that follow from /model_toml and the mesh: see description_differences;
+/// - all fields determined by /model_toml and the mesh: see description_differences;
 /// - the index against the metadata of HDF5: see is_index_right.
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples = 12);
 
-/// The report as lines of text.
+/// Report as lines of text.
 std::string to_text(const VerifyReport& report);
 
 }  // namespace palpate

@@ -5,7 +5,7 @@
 
 namespace palpate {
 
-/// Its largest relative error and the bound that it must keep.
+/// Largest relative error of a check, and its bound.
 struct Check {
   std::string name;
   double error = 0.0;

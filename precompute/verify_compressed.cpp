@@ -18,8 +18,8 @@ namespace {
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
 
-constexpr std::int64_t verified_touches = 16;  // of each number of nodes
-constexpr std::uint64_t seed = 1 << 20;        // others than those of the certificate
+constexpr std::int64_t verified_touches = 16;  // per number of nodes
+constexpr std::uint64_t seed = 1 << 20;        // differs from the certificate's
 
 std::vector<Check> check_probes(const Model& model) {
   const double tolerance = model.compressed->tolerance;
@@ -39,7 +39,7 @@ std::vector<Check> check_probes(const Model& model) {
   return {probes, energy};
 }
 
-/// Columns of random nodes, by what of them is near and what is far.
+/// Checks columns of random nodes, their near and their far part.
 std::vector<Check> check_columns(const Model& model, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, double solver, int samples) {
   const HierarchicalMatrix& matrix = *model.compressed;

@@ -1,4 +1,4 @@
-// Whether the fields of a file are those that its own description asks for.
+// Comparison of a file's fields with its own description.
 #pragma once
 
 #include <filesystem>
@@ -10,9 +10,9 @@
 namespace palpate {
 
 /// Reads /model_toml again and compares everything that follows from it and the stored mesh: name, analysis,
-/// thickness, materials and what each element is made of, held nodes and where to, loads, scope, precision,
-/// overlays and dynamics. A sentence for each field that differs, empty when none does. What selects by tags
-/// of the mesh file, which are not stored, is left out. `file`: for messages.
+/// thickness, materials and the material of each element, held nodes and their displacements, loads, scope,
+/// precision, overlays and dynamics. One sentence per field that differs, empty if none does. Selections by
+/// tags of the mesh file, which are not stored, are left out. `file`: for messages.
 std::vector<std::string> description_differences(const Model& model, const std::filesystem::path& file);
 
 }  // namespace palpate

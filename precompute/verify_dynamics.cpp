@@ -15,7 +15,7 @@ namespace {
 using Vector = Eigen::VectorXd;
 
 constexpr double residual_bound = 1e-6, mass_bound = 1e-6;
-constexpr std::int64_t completed_modes = 4;  // whose inside is solved for
+constexpr std::int64_t completed_modes = 4;  // whose interior is solved for
 
 double relative_difference(const std::vector<double>& values, const std::vector<double>& reference) {
   if (values.size() != reference.size()) return INFINITY;
@@ -50,7 +50,7 @@ std::vector<Check> check_inverse(const Model& model, const Stiffness& stiffness,
                        solver_error(factor, K_bar, stored_dofs, samples), "inverse ", samples);
 }
 
-/// Shapes at all dofs of K, from those at the stored ones.
+/// Computes shapes at all dofs of K from those at the stored ones.
 class Completion {
  public:
   Completion(const Stiffness& stiffness, const SparseMatrix& M, const std::vector<std::int64_t>& stored_dofs)
@@ -62,7 +62,7 @@ class Completion {
 
   [[nodiscard]] bool is_needed() const { return inner_count_ > 0; }
 
-  /// u has the stored dofs and zeros.
+  /// Completes u, which has the stored dofs and zeros.
   void complete(Vector& u, double omega) const {
     if (!is_needed()) return;
     SparseMatrix A = K_;  // in one pattern, as assembled
@@ -90,7 +90,7 @@ class Completion {
  private:
   const SparseMatrix& K_;
   const SparseMatrix& M_;
-  std::vector<std::int64_t> inner_;  // [n] number among the dofs that are not stored, -1 where it is stored
+  std::vector<std::int64_t> inner_;  // [n] number among the dofs that are not stored, -1 for stored ones
   std::int64_t inner_count_ = 0;
 };
 
@@ -103,7 +103,8 @@ std::vector<Check> check_modes(const Model& model, const Stiffness& stiffness, c
   Check residual{"modes", 0.0, residual_bound}, mass{"modal mass", 0.0, mass_bound};
   Eigen::MatrixXd shapes = Eigen::MatrixXd::Zero(stiffness.K.rows(), count), M_shapes = shapes;
   for (std::int64_t k = 0; k < count; ++k) {
-    const std::int64_t i = count > 1 ? k * (modes - 1) / (count - 1) : 0;  // the first, the last, between
+    const std::int64_t i = count > 1 ? k * (modes - 1) / (count - 1) : 0;  // the first, the last, and some
+                                                                           // between
     const double omega = dynamics.omega[static_cast<std::size_t>(i)];
     Vector phi = Vector::Zero(stiffness.K.rows());
     for (std::size_t s = 0; s < stored_dofs.size(); ++s)

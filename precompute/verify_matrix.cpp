@@ -12,11 +12,11 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 constexpr int vectors = 4;          // of random signs
-constexpr double deviations = 8.0;  // of a sum of roundings: exceeded once in 10^13
+constexpr double deviations = 8.0;  // for a sum of roundings: exceeded once in 10^13
 constexpr double touch_safety = 4.0;
 using Signs = Eigen::Array<double, vectors, 1>;
 
-/// What is stored (without the smooth part) times the vectors, and the squares of the rows' lengths.
+/// The stored entries (without the smooth part) times the vectors, and the squares of the rows' lengths.
 template <class T>
 void multiply(std::span<const T> packed, const std::vector<Signs>& r, std::vector<Signs>& y,
               Vector& squares) {

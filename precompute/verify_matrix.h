@@ -1,4 +1,4 @@
-// What `verify` asks of a packed matrix.
+// Checks of packed and compressed matrices for `verify`.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace palpate {
 
-inline constexpr double solver_safety = 100.0;  ///< times `solver_error` may a column be wrong by
+inline constexpr double solver_safety = 100.0;  ///< times `solver_error` is the allowed error of a column
 inline constexpr double sum_rounding = 1e-13;   ///< of sums of products, relative to the largest
 inline constexpr double same_sum = 1e-12;       ///< two sums of the same element integrals, relative
 
-/// Rounding of one stored entry, relative to what is stored (R with split precision).
+/// Rounding error of one stored entry, relative to the stored value (R with split precision).
 double unit_roundoff(Precision precision) noexcept;
 
-/// How far plain solves with K are from refined ones, relative to the largest entry of each: what the columns
-/// of the file can be wrong by, whatever they are stored in. `samples` columns of the stored dofs.
+/// Difference between plain and refined solves with K, relative to the largest entry of each: the error that
+/// the file's columns may have, however they are stored. From `samples` columns of the stored dofs.
 double solver_error(const Factor& factor, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
                     int samples);
 
@@ -27,13 +27,12 @@ double solver_error(const Factor& factor, const SparseMatrix& K, std::span<const
 /// `solver`: see solver_error. Named NAME "columns", NAME "rows", NAME "touches":
 /// - columns: `samples` columns, |A e - x|_max / |x|_max against two roundings, 1e-13 and a hundred times
 /// `solver`;
-/// - rows: y = A r for four vectors r of random signs against x = K^-1 r. If each entry is wrong by its
-///   rounding alone, |y - x| of row i exceeds 8 times the rounding of |A_i|, its length, once in 10^13
-///   (Hoeffding). The error is the largest |y - x| in units of that (and of what the solver and the sums are
-///   wrong by). One entry that is wrong by more than twice the bound of its row or of its column is found for
-///   certain, several in one row are missed with a chance of at most 1/16;
-/// - touches: force_error against `measured`, what the file says of it, four times; at least
-///   good_force_error.
+/// - rows: y = A r for four vectors r of random signs against x = K^-1 r. If the only error of each entry is
+/// its rounding, |y - x| of row i exceeds 8 times the rounding of |A_i|, its length, once in 10^13
+/// (Hoeffding). The error is the largest |y - x| in units of that (and of the errors of the solver and the
+/// sums). One entry that is wrong by more than twice the bound of its row or of its column is always found,
+/// several in one row are missed with a probability of at most 1/16;
+/// - touches: force_error against `measured`, the file's own value, four times; at least good_force_error.
 std::vector<Check> verify_matrix(const Model& model, const PackedGreens& stored, const ForceErrors& measured,
                                  const Factor& factor, const SparseMatrix& K,
                                  std::span<const std::int64_t> stored_dofs, double solver,

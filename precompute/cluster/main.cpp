@@ -1,4 +1,4 @@
-// palpate-precompute-mpi: palpate-precompute by the ranks of MPI.
+// palpate-precompute-mpi: palpate-precompute on ranks of MPI.
 #include <mpi.h>
 #include <unistd.h>
 
@@ -19,9 +19,10 @@ namespace palpate {
 namespace {
 
 constexpr const char* program = "palpate-precompute-mpi";
-constexpr std::chrono::seconds leader_first{10};  // all ranks have most errors, and the leader tells of them
+constexpr std::chrono::seconds leader_first{10};  // most errors occur on all ranks, and the leader reports
+                                                  // them
 
-/// An error of another rank than the leader, with its place.
+/// An error of a rank other than the leader, with its place.
 Error of_rank(const Error& error, const RankTeam& team) {
   std::array<char, 256> host = {};
   ::gethostname(host.data(), host.size() - 1);
@@ -29,7 +30,7 @@ Error of_rank(const Error& error, const RankTeam& team) {
   return {error.what(), error.where().empty() ? rank : rank + ": " + error.where(), error.hint()};
 }
 
-/// Runs the command line. True in `failed` where it threw: then the other ranks wait in vain.
+/// Runs the command line. Sets `failed` if it threw: the other ranks then wait in vain.
 int run_ranks(int argc, char** argv, bool& failed) {
   RankTeam team;
   try {
@@ -50,7 +51,7 @@ int run_ranks(int argc, char** argv, bool& failed) {
   }
 }
 
-/// Whether the command line only asks for help, which needs no ranks.
+/// True if the command line only asks for help, which needs no ranks.
 bool asks_for_help(int argc, char** argv) {
   return std::any_of(argv + 1, argv + argc, [](const char* argument) {
     const std::string_view word = argument;

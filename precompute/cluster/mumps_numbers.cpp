@@ -22,10 +22,10 @@ constexpr std::int64_t megabyte = 1'000'000;
 
 enum class Job : MUMPS_INT { begin = -1, end = -2, analyse = 1, factorize = 2, solve = 3 };
 
-/// What rank 0 says before ranks solve.
+/// Command of rank 0 before ranks solve.
 enum class Call : std::int64_t { solve, multiply, release };
 
-/// Entries of loads by columns, counted from 1, as MUMPS takes them.
+/// Entries of loads by columns, counted from 1, in MUMPS's format.
 struct SparseLoads {
   std::vector<MUMPS_INT> starts{1};
   std::vector<MUMPS_INT> rows;
@@ -38,7 +38,7 @@ struct SparseLoads {
   void end_column() { starts.push_back(static_cast<MUMPS_INT>(rows.size() + 1)); }
 };
 
-/// Rows of a solution that a rank has found: `places` [rows] in the order of the caller's, `values`
+/// Rows of a solution that a rank computed: `places` [rows] in the order of the caller's, `values`
 /// [rows x columns] column-major.
 struct SolutionRows {
   std::vector<int> places;
@@ -74,7 +74,7 @@ class MumpsNumbers : public SpreadNumbers {
   [[nodiscard]] SpreadMemory memory() const override { return memory_; }
 
  private:
-  /// A call, its columns and the rows that it wants.
+  /// A call, its columns and the requested rows.
   struct Announcement {
     Call call = Call::release;
     std::int64_t columns = 0, rows = 0;
@@ -103,7 +103,7 @@ class MumpsNumbers : public SpreadNumbers {
   bool interrupted_ = false;
 };
 
-/// One rank's share of K: columns next to each other, whose values are used where they are.
+/// Passes one rank's part of K to MUMPS: adjacent columns, whose values are used in place.
 void MumpsNumbers::give_entries() {
   const std::int64_t entries = K_.nonZeros();
   const std::int64_t* starts = K_.outerIndexPtr();
@@ -162,7 +162,7 @@ MumpsNumbers::MumpsNumbers(MPI_Comm ranks, const SparseMatrix& K, std::span<cons
   memory_.room = options.room;
 }
 
-/// Throws Error where the library is another one than the header was of.
+/// Throws Error if the library's version differs from its header's.
 void MumpsNumbers::expect_version() const {
   const std::string here = mumps_.version_number, built_for = MUMPS_VERSION;
   if (here == built_for) return;
@@ -171,8 +171,7 @@ void MumpsNumbers::expect_version() const {
 }
 
 MumpsNumbers::~MumpsNumbers() {
-  if (std::uncaught_exceptions() > unwinding_)
-    return;  // the other ranks are elsewhere: the run is at its end
+  if (std::uncaught_exceptions() > unwinding_) return;  // the other ranks are elsewhere: the run is ending
   run(Job::end);
   MPI_Comm_free(&ranks_);
 }
@@ -211,7 +210,7 @@ MumpsNumbers::Announcement MumpsNumbers::announce(Call call, std::int64_t column
   return {static_cast<Call>(said[0]), said[1], said[2]};
 }
 
-/// x holds the loads [n, columns] of rank 0, and then the solution.
+/// Solves with the loads [n, columns] of rank 0 in x, which become the solution.
 void MumpsNumbers::solve_dense(std::span<double> x, std::int64_t columns) {
   mumps_.nrhs = static_cast<MUMPS_INT>(columns);
   mumps_.lrhs = mumps_.n;
@@ -244,14 +243,14 @@ std::vector<int> MumpsNumbers::places(std::span<const std::int64_t> dofs) const 
   return place_of;
 }
 
-/// The rows with a place that this rank finds; `loads` are rank 0's.
+/// Solves for the rows with a place that this rank computes; `loads` are rank 0's.
 SolutionRows MumpsNumbers::solve_sparse(SparseLoads loads, std::int64_t columns,
                                         const std::vector<int>& place_of) {
   const MUMPS_INT found = mumps_.info[22];  // rows
   std::vector<double> values(static_cast<std::size_t>(std::max<MUMPS_INT>(found, 1) * columns));
   std::vector<MUMPS_INT> dofs(static_cast<std::size_t>(std::max<MUMPS_INT>(found, 1)));
   mumps_.nrhs = static_cast<MUMPS_INT>(columns);
-  if (leads()) {  // MUMPS refuses loads of others
+  if (leads()) {  // MUMPS refuses loads of other ranks
     mumps_.nz_rhs = static_cast<MUMPS_INT>(loads.rows.size());
     mumps_.irhs_ptr = loads.starts.data();
     mumps_.irhs_sparse = loads.rows.data();
@@ -261,7 +260,7 @@ SolutionRows MumpsNumbers::solve_sparse(SparseLoads loads, std::int64_t columns,
   mumps_.sol_loc = values.data();
   mumps_.isol_loc = dofs.data();
   control(20) = 3;  // loads are sparse: only their paths to the root are swept
-  control(21) = 1;  // solutions stay where they are found
+  control(21) = 1;  // solutions stay on the rank that computes them
   control(27) = mumps_.nrhs;
   run(Job::solve);
   if (mumps_.infog[0] < 0) throw failure(mumps_, "solution with K");
@@ -279,7 +278,7 @@ SolutionRows MumpsNumbers::solve_sparse(SparseLoads loads, std::int64_t columns,
   return rows;
 }
 
-/// Rows to their places in the leader's u [places, columns], row-major.
+/// Gathers rows to their places in the leader's u [places, columns], row-major.
 void MumpsNumbers::gather(const SolutionRows& found, bool interrupted_here, std::int64_t columns,
                           std::span<double> u) {
   const auto ranks = static_cast<std::size_t>(size_);
@@ -322,7 +321,7 @@ void MumpsNumbers::multiply(std::span<const std::int64_t> from, std::int64_t col
       const double value = f[k * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c)];
       if (from[k] >= 0 && value != 0.0) loads.add(from[k], value);
     }
-    if (loads.rows.size() + 1 == static_cast<std::size_t>(loads.starts.back())) {  // a column is not empty
+    if (loads.rows.size() + 1 == static_cast<std::size_t>(loads.starts.back())) {  // no column is empty
       const auto free = std::find_if(from.begin(), from.end(), [](std::int64_t dof) { return dof >= 0; });
       loads.add(free == from.end() ? 0 : *free, 0.0);
     }
@@ -331,7 +330,7 @@ void MumpsNumbers::multiply(std::span<const std::int64_t> from, std::int64_t col
   const std::vector<int> place_of = places(to);
   std::fill(u.begin(), u.end(), 0.0);
   gather(solve_sparse(std::move(loads), columns, place_of), false, columns, u);
-  for (std::int64_t k = 0; k < std::ssize(to); ++k) {  // a dof that is wanted twice has its row once
+  for (std::int64_t k = 0; k < std::ssize(to); ++k) {  // a dof that is requested twice is computed once
     const std::int64_t dof = to[static_cast<std::size_t>(k)];
     if (dof < 0) continue;
     const std::int64_t place = place_of[static_cast<std::size_t>(dof)];

@@ -1,4 +1,4 @@
-// A factor over the ranks of MPI, by MUMPS.
+// A factor distributed over the ranks of MPI by MUMPS.
 #pragma once
 
 #include <mpi.h>
@@ -12,18 +12,18 @@
 
 namespace palpate {
 
-/// How MUMPS is used.
+/// Options for MUMPS.
 struct MumpsOptions {
-  int threads = 1;  ///< of a rank, in products of matrices
-  int room = 30;  ///< work space beyond what MUMPS estimates [percent]; more is tried where it is too little
+  int threads = 1;  ///< per rank, in products of matrices
+  int room = 30;    ///< work space beyond MUMPS's estimate [percent]; more is tried if it is too little
 };
 
-/// Whether this build has MUMPS.
+/// True if this build has MUMPS.
 [[nodiscard]] bool has_mumps();
 
-/// The numbers of a factor of K (lower triangle) over all ranks of `ranks`, eliminated in the order
-/// `permutation` [n]: dof at each position. Analyses; all ranks have all of K, which is kept by reference.
-/// Throws Error where this build has no MUMPS, or finds another one than it was built for.
+/// Numbers of a factor of K (lower triangle) over all ranks of `ranks`, with the elimination order
+/// `permutation` [n]: the dof at each position. Analyses; all ranks have all of K, to which it keeps a
+/// reference. Throws Error if this build has no MUMPS, or loads another version than it was built for.
 [[nodiscard]] std::unique_ptr<SpreadNumbers> make_mumps_numbers(MPI_Comm ranks, const SparseMatrix& K,
                                                                 std::span<const std::int64_t> permutation,
                                                                 const MumpsOptions& options);

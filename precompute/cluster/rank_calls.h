@@ -1,4 +1,4 @@
-// Calls of MPI that leave the processor to threads that work.
+// MPI calls that leave the processor to working threads.
 #pragma once
 
 #include <mpi.h>
@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Waits without a processor: MPI's own waiting would take one from the threads that solve.
+/// Waits without using a processor: MPI's own waiting would take one from the threads that solve.
 inline void wait(MPI_Request& request) {
   auto pause = std::chrono::microseconds(20);
   for (int done = 0;;) {
@@ -20,7 +20,7 @@ inline void wait(MPI_Request& request) {
   }
 }
 
-/// From one rank to all.
+/// Broadcasts from one rank to all.
 inline void broadcast(void* data, int count, MPI_Datatype type, MPI_Comm comm, int from = 0) {
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibcast(data, count, type, from, comm, &request);

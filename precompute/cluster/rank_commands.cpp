@@ -59,7 +59,7 @@ Spreading spreading_of(const std::string& factor_of) {
   return factor_of == "distributed" ? Spreading::always : Spreading::where_needed;
 }
 
-/// A rank that bakes by itself, beside others that do so too: then it does not print.
+/// A rank that bakes by itself beside others that do the same, and therefore does not print.
 class SingleRank : public Team {
  public:
   explicit SingleRank(const Team& all) : all_(all) {}
@@ -71,7 +71,7 @@ class SingleRank : public Team {
   const Team& all_;
 };
 
-/// Throws CLI::ParseError.
+/// Throws CLI::ParseError for contradictory arguments.
 void check_arguments(const Arguments& arguments) {
   if (arguments.models.empty()) throw CLI::RequiredError("MODEL.toml");
   if (arguments.models.size() > 1 && !arguments.bake.output.empty())
@@ -85,7 +85,7 @@ void check_arguments(const Arguments& arguments) {
                           CLI::ExitCodes::ExtrasError);
 }
 
-/// All ranks bake a model. Adds its entry of the report, in the leader.
+/// Bakes a model on all ranks. Adds its entry of the report, in the leader.
 int bake_together(const std::string& model, const BakeOptions& options, Team& team,
                   std::vector<std::string>& entries) {
   const BakeSummary bake = bake_model(model, options, team);
@@ -94,7 +94,7 @@ int bake_together(const std::string& model, const BakeOptions& options, Team& te
   return team.any(bake.result == BakeResult::interrupted) ? exit_interrupted : exit_ok;
 }
 
-/// Ranks bake models that they draw, each alone, and print a line for each. An error of one does not keep the
+/// Bakes models that ranks draw, each alone, and prints a line for each. An error of one does not stop the
 /// others.
 int bake_side_by_side(const std::vector<std::string>& models, const BakeOptions& options, Team& team,
                       std::vector<std::string>& entries) {
@@ -121,7 +121,7 @@ int bake_side_by_side(const std::vector<std::string>& models, const BakeOptions&
   return team.any(failed) ? exit_input_error : exit_ok;
 }
 
-/// Bakes all models and returns the status.
+/// Bakes all models and returns the exit status.
 int run_bakes(const Arguments& arguments, Team& team) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::string> entries;

@@ -17,10 +17,10 @@
 namespace palpate {
 namespace {
 
-constexpr std::chrono::microseconds between_looks{500};  // while threads of the rank solve
-constexpr std::int64_t no_tile = -1;                     // of news that are a line
+constexpr std::chrono::microseconds between_looks{500};  // time between polls while threads of the rank solve
+constexpr std::int64_t no_tile = -1;                     // marks a report that is a line
 
-/// Threads of each rank of a node, whose processors they share where they are not bound to some.
+/// Threads of each rank of a node; ranks that are not bound to processors divide them equally.
 int threads_of_rank(MPI_Comm node) {
   cpu_set_t mask;
   CPU_ZERO(&mask);
@@ -31,7 +31,7 @@ int threads_of_rank(MPI_Comm node) {
   return std::max(1, std::min(allotted_processors(), CPU_COUNT(&mask) / size_of(node)));
 }
 
-/// The text of one rank, in all.
+/// Text of one rank, in all ranks.
 std::string text_of_rank(int rank, std::string text) {
   constexpr std::int64_t at_once = std::int64_t{1} << 30;  // MPI counts in ints
   std::int64_t bytes = std::ssize(text);
@@ -45,12 +45,12 @@ std::string text_of_rank(int rank, std::string text) {
 
 }  // namespace
 
-/// One call of `work`.
+/// State of one call of `work`.
 struct RankTeam::Round {
   const std::vector<Tile>& tiles;
   const TileWork& work;
   std::atomic<int> solving;      // threads of this rank
-  std::exception_ptr failure{};  // of one of them
+  std::exception_ptr failure{};  // exception of one of them
 };
 
 RankTeam::RankTeam() : rank_(rank_in(MPI_COMM_WORLD)), size_(size_of(MPI_COMM_WORLD)) {
@@ -70,7 +70,7 @@ void RankTeam::end() {
   MPI_Win_free(&counter_);
 }
 
-/// A tile that no other thread is given, or none of this call's where all are.
+/// Draws a tile that no other thread gets; a number past the last if none is left.
 std::int64_t RankTeam::draw() {
   constexpr std::int64_t one = 1;
   std::int64_t tile = 0;
@@ -87,7 +87,7 @@ void RankTeam::set_counter(std::int64_t tile) {
   MPI_Win_flush(0, counter_);
 }
 
-/// A thread's work.
+/// Work of one thread.
 void RankTeam::solve(Round& round, int worker) {
   const std::int64_t tiles = std::ssize(round.tiles);
   try {
@@ -115,20 +115,20 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   try {
     return attend(round);
   } catch (...) {
-    set_counter(std::ssize(all));  // threads end with the tiles that they have
+    set_counter(std::ssize(all));  // threads end after their current tiles
     throw;
   }
 }
 
-/// Returns once all ranks have told of all that they have solved: then no tile is under way, and no thread
-/// draws any more.
+/// Polls until all ranks have reported everything that they solved: then no tile is being solved, and no
+/// thread draws any more.
 bool RankTeam::attend(Round& round) {
   bool stopped = false;
   for (bool ended = false; !ended;) {
     ended = round.solving == 0;
     if (!stopped && round.work.interrupted()) {
       stopped = true;
-      set_counter(std::ssize(round.tiles));  // for all ranks
+      set_counter(std::ssize(round.tiles));  // stops all ranks
     }
     pass_on(round);
     if (!ended) std::this_thread::sleep_for(between_looks);
@@ -143,7 +143,8 @@ bool RankTeam::attend(Round& round) {
   return any_stopped == 0;
 }
 
-/// News of this rank's threads, and in the leader those of other ranks. Throws what a thread has thrown.
+/// Passes on reports of this rank's threads, and in the leader those of other ranks. Rethrows the exception
+/// of a thread.
 void RankTeam::pass_on(Round& round) {
   const std::string own = take_news();
   {
@@ -172,7 +173,7 @@ std::string RankTeam::take_news() {
   return std::exchange(news_, {});
 }
 
-/// Returns once the leader has them, so that nothing is on its way when all ranks have ended.
+/// Sends reports and returns once the leader has them, so that none are in flight when all ranks have ended.
 void RankTeam::send_news(const std::string& news) {
   if (news.empty()) return;
   MPI_Request request = MPI_REQUEST_NULL;
@@ -183,7 +184,7 @@ void RankTeam::send_news(const std::string& news) {
   while (!is_over(request)) std::this_thread::sleep_for(between_looks);
 }
 
-/// News that a rank has sent; nothing where none has.
+/// A report that a rank has sent; empty if there is none.
 std::string RankTeam::receive_news() {
   int there = 0, count = 0;
   MPI_Status status = {};

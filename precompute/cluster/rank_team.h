@@ -1,4 +1,4 @@
-// Ranks of MPI as the processes of a bake.
+// MPI ranks as the processes of a bake.
 #pragma once
 
 #include <mpi.h>
@@ -15,12 +15,12 @@
 
 namespace palpate {
 
-/// All ranks of MPI_COMM_WORLD, rank 0 leading. Their threads draw tiles from a counter in a window of rank
-/// 0, and the main thread of each rank tells the leader what they have written. It sleeps between its looks.
-/// One thread of a rank calls MPI at a time. Where a rank dies, MPI ends the others.
+/// All ranks of MPI_COMM_WORLD, led by rank 0. Their threads draw tiles from a counter in a window of rank 0,
+/// and the main thread of each rank reports what they have written to the leader, sleeping between polls. One
+/// thread of a rank calls MPI at a time. If a rank dies, MPI ends the others.
 class RankTeam : public Team {
  public:
-  /// MPI_Init_thread was called, for MPI_THREAD_SERIALIZED.
+  /// Requires MPI_Init_thread with MPI_THREAD_SERIALIZED.
   RankTeam();
 
   [[nodiscard]] bool leads() const override { return rank_ == 0; }
@@ -39,7 +39,7 @@ class RankTeam : public Team {
   void exchange(const std::string& bytes, const std::function<void(std::string_view)>& take) override;
   void tell(const std::string& line) override;
 
-  /// After all else, in all ranks.
+  /// Frees MPI objects; call it last, in all ranks.
   void end();
 
  private:
@@ -57,10 +57,10 @@ class RankTeam : public Team {
   bool is_over(MPI_Request& request);
 
   int rank_ = 0, size_ = 1, size_here_ = 1, default_jobs_ = 1;
-  MPI_Win counter_ = MPI_WIN_NULL;  // the next tile that nobody has drawn; in rank 0
-  std::mutex calls_;                // of MPI while threads draw
-  std::mutex telling_;              // of what follows
-  std::string news_;                // for the leader
+  MPI_Win counter_ = MPI_WIN_NULL;  // next tile to draw; in rank 0
+  std::mutex calls_;                // guards MPI calls while threads draw
+  std::mutex telling_;              // guards news_ and the failure of a round
+  std::string news_;                // reports for the leader
 };
 
 }  // namespace palpate

@@ -15,9 +15,9 @@ namespace {
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr Index near_share = 16;  // of the nodes near a place, one in so many is touched
+constexpr Index near_share = 16;  // one in this many of the nodes near a place is touched
 
-/// Nodes of the k-th touch, the first at random.
+/// Nodes of the k-th touch; the first is random.
 std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
                                  std::span<const Index> touchable, Index count, std::mt19937_64& random) {
   const auto all = static_cast<Index>(touchable.size());
@@ -39,7 +39,7 @@ std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
   return nodes;
 }
 
-/// Share of its bound that the error of a touch's total force is; 0 where the bound is 0.
+/// Error of a touch's total force divided by its bound; 0 if the bound is 0.
 double bound_share(const HierarchicalMatrix& matrix, std::span<const Index> nodes, const Rows& exact,
                    const Rows& C, const Eigen::MatrixXd& u) {
   const int d = matrix.dimension;

@@ -1,4 +1,4 @@
-// What compressed Green's functions do to forces, measured.
+// Measured effect of compression on forces.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@
 
 namespace palpate {
 
-/// Relative force errors of touches with as many nodes.
+/// Relative force errors of touches with `nodes` nodes.
 struct TouchErrors {
   Index nodes = 0;
   std::vector<double> errors;  ///< ascending
-  /// What the touches' total forces are off by over what ErrorBound says they are at most, ascending; of
-  /// those where it says anything, the largest over axes and displacements.
+  /// Errors of the touches' total forces divided by ErrorBound, ascending; for each touch with a bound, the
+  /// largest over axes and displacements.
   std::vector<double> bound_shares{};
 
   [[nodiscard]] double largest_bound_share() const {
@@ -31,23 +31,24 @@ struct TouchErrors {
   }
 };
 
-/// Touches with so many nodes are measured.
+/// Numbers of nodes of the measured touches.
 inline constexpr std::array<Index, 4> certified_nodes = {1, 5, 30, 100};
 
-/// What touches of a body need to know of its stored nodes.
+/// Stored nodes of a body for choosing touches.
 struct TouchablePoints {
   std::vector<Vec3> points;      ///< [N] of all stored nodes [m]
   std::vector<Index> touchable;  ///< stored nodes of the surface that are free along every axis
 };
 
-/// `stored_nodes` [N] are nodes of the model's mesh, in the order of the matrix.
+/// Points of `stored_nodes` [N], nodes of the model's mesh in the order of the matrix.
 TouchablePoints touchable_points(const Model& model, std::span<const Index> stored_nodes);
 
-/// Force errors of `touches` random touches for each of certified_nodes (as many as there are nodes):
-/// those nearest to a random node, some of those near it, and some of all, in turns. Displacements and error
-/// as in touch_error; the reference is solved with the factor. `touchable` are stored nodes that are free
-/// along every axis (none: no errors), `points` [N] of all stored nodes; `seed` chooses the touches.
-/// `progress` is told the share that is done, and says false to stop: then what is there is given.
+/// Force errors of `touches` random touches for each of certified_nodes (or of all nodes, if there are
+/// fewer): nodes nearest to a random node, some of those near it, and some of all, in turns. Displacements
+/// and error as in touch_error; the reference is solved with the factor. `touchable` are stored nodes that
+/// are free along every axis (none: no errors), `points` [N] of all stored nodes; `seed` determines the
+/// touches. `progress` gets the finished fraction and returns false to stop; the errors so far are then
+/// returned.
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,

@@ -57,7 +57,8 @@ class Clustering {
     split(2 * c + 2);
   }
 
-  /// Where both sides are equal but for rounding, as on a grid, that must not decide: machines differ in it.
+  /// True if two clusters are far. If both sides are equal up to rounding, as on a grid, rounding must not
+  /// decide: machines differ in it.
   [[nodiscard]] bool far(Index a, Index b) const {
     const Box &A = boxes_[static_cast<std::size_t>(a)], &B = boxes_[static_cast<std::size_t>(b)];
     const double diameter = std::max(A.diagonal().norm(), B.diagonal().norm());
@@ -65,7 +66,7 @@ class Clustering {
     return distance > 0.0 && diameter <= (1.0 + 1e-9) * options_.eta * distance;
   }
 
-  /// a >= b
+  /// Adds the pairs of clusters a >= b.
   void compare(Index a, Index b) {
     if (a != b && far(a, b)) {
       result_.far_pair.push_back({a, b});

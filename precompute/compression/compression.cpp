@@ -24,23 +24,23 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Dofs = std::vector<std::int64_t>;
 
-constexpr Index spare_samples = 12;     // more than the largest rank: what they say of it is certain
-constexpr double skeleton_share = 0.2;  // of the cut: skeletons are not to add to the error
+constexpr Index spare_samples = 12;     // samples beyond the largest rank, which make it certain
+constexpr double skeleton_share = 0.2;  // of the cut: skeletons must not add to the error
 constexpr Index samples = random_loads;
 constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
-constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
+constexpr Index leaves_estimated = 64;        // to estimate flops
 constexpr std::int64_t loads_at_once = 32;    // solved together
 constexpr double front_share = 0.3;           // of the time of far pairs, a guess
-constexpr Index checks = 32;                  // more loads, that tell how far off the pairs are
+constexpr Index checks = 32;                  // more loads, to measure the error of the pairs
 
-/// Rows of a matrix as combinations of some of them.
+/// Rows of a matrix as combinations of some of its rows.
 struct Interpolation {
-  std::vector<Eigen::Index> skeleton;  ///< numbers of the rows that the others follow
+  std::vector<Eigen::Index> skeleton;  ///< numbers of the rows that the others are combined from
   Eigen::MatrixXd follow;              ///< [rows x skeleton], the identity in the skeleton
 };
 
-/// Interpolation of the rows of A by as few of them as leave of W (A - follow A) at most `cut`, Frobenius'
-/// norm.
+/// Interpolation of the rows of A by as few of them as leave |W (A - follow A)| at most `cut`, in the
+/// Frobenius norm.
 Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
   if (A.rows() == 0) return {};  // of children that need no terms
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A.transpose());
@@ -53,7 +53,7 @@ Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
     return (others * R.bottomRightCorner(most - rank, rows - rank).transpose()).norm();
   };
   Eigen::Index rank = 0;
-  for (Eigen::Index end = most; rank < end;) {  // the first with which little enough is left
+  for (Eigen::Index end = most; rank < end;) {  // smallest rank that leaves little enough
     const Eigen::Index middle = (rank + end) / 2;
     left(middle) <= cut ? end = middle : rank = middle + 1;
   }
@@ -96,15 +96,15 @@ struct Compression::Impl {
   bool check(HierarchicalMatrix& matrix);
 
  private:
-  /// What is known of a cluster while its level is worked on.
+  /// State of a cluster while its level is computed.
   struct Front {
     Dofs skeleton;  ///< stored dofs
-    Rows response;  ///< [skeleton x samples] to loads that are far, each row over the root of D
+    Rows response;  ///< [skeleton x samples] to far loads, each row divided by the root of D
     Rows load;      ///< [skeleton x samples]
-    /// What an error of the responses is on the leaves: W e is as long as L^-1 times what the dofs of the
-    /// cluster are off by, L the roots of the leaves.
+    /// Norm of an error e of the responses on the leaves: |W e| = |L^-1 (error of the cluster's dofs)|, with
+    /// L the Cholesky factors of the leaves.
     Eigen::MatrixXd W;
-    Eigen::MatrixXd V;  ///< of a leaf V, of others E of both children, one under the other
+    Eigen::MatrixXd V;  ///< V of a leaf; of other clusters E of both children, one below the other
   };
 
   [[nodiscard]] std::int64_t first_dof(Index c) const {
@@ -123,19 +123,19 @@ struct Compression::Impl {
     return std::span(matrix_.neighbour)
         .subspan(at(matrix_.near_from[i]), at(matrix_.near_from[i + 1] - matrix_.near_from[i]));
   }
-  /// Where the entries of the near pairs of a leaf [0, leaves) begin, and where they end.
+  /// First entry of the near pairs of a leaf [0, leaves), and the end.
   [[nodiscard]] std::int64_t near_begin(Index leaf) const {
     return matrix_.near_at[at(matrix_.first_near_pair(leaf))];
   }
   [[nodiscard]] std::int64_t near_end(Index leaf) const { return near_begin(leaf + 1); }
-  /// Dofs of K of stored dofs.
+  /// Dofs of K for stored dofs.
   [[nodiscard]] Dofs dofs_of(const Dofs& stored) const {
     Dofs dofs;
     for (const std::int64_t dof : stored) dofs.push_back(stored_dofs_[at(dof)]);
     return dofs;
   }
 
-  /// What is told of items that are a stage from one share of it to another.
+  /// Progress callback for items that make up a stage from fraction `from` to `to`.
   [[nodiscard]] std::function<bool(double)> told(CompressionStage stage, double from = 0.0, double to = 1.0) {
     return [=, this](double share) { return progress_(stage, std::lerp(from, to, share)); };
   }
@@ -159,7 +159,7 @@ struct Compression::Impl {
   CompressionProgress progress_;
   HierarchicalMatrix matrix_;
   std::shared_ptr<float[]> near_;
-  Eigen::VectorXd root_;             // [order] of D, 0 where held
+  Eigen::VectorXd root_;             // [order] root of D, 0 where held
   Rows response_, load_;             // [order x (samples + checks)]
   std::vector<bool> needed_;         // [clusters]
   std::vector<Front> fronts_;        // [clusters]
@@ -197,7 +197,7 @@ bool Compression::Impl::gather_near(const FetchNear& fetch) {
   return true;
 }
 
-/// The pairs in which the leaf is the column.
+/// Solves for the pairs with the leaf as column.
 void Compression::Impl::solve_near_of(Index leaf, std::span<float> entries,
                                       SelectedSolver::Workspace& workspace) {
   const std::int64_t width = end_dof(leaf) - first_dof(leaf);
@@ -210,11 +210,11 @@ void Compression::Impl::solve_near_of(Index leaf, std::span<float> entries,
   solver_.solve(rows, stored_dofs_.subspan(at(first_dof(leaf)), at(width)), workspace, block);
   std::transform(block.begin(), block.end(), entries.begin(),
                  [](double value) { return static_cast<float>(value); });
-  for (std::int64_t i = 0; i < width; ++i)  // the leaf itself comes first
+  for (std::int64_t i = 0; i < width; ++i)  // the leaf with itself comes first
     for (std::int64_t j = i + 1; j < width; ++j) entries[at(i * width + j)] = entries[at(j * width + i)];
 }
 
-/// Loads L^-T (+-1) on every leaf, L its root, and what they do.
+/// Makes loads L^-T (+-1) on every leaf, with L its Cholesky factor, and solves for their responses.
 bool Compression::Impl::sample() {
   const std::int64_t n = matrix_.order(), m = samples + checks;
   load_.resize(n, m);
@@ -250,7 +250,7 @@ bool Compression::Impl::sample() {
   return sharing_.for_each(blocks);
 }
 
-/// All dofs of a leaf, loads on its neighbours taken off.
+/// Front of a leaf: all its dofs, with the response to loads on its neighbours subtracted.
 Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   Front front;
   const std::int64_t first = first_dof(leaf), n = end_dof(leaf) - first;
@@ -277,7 +277,8 @@ Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   return front;
 }
 
-/// The skeletons of both children, loads on their partners taken off.
+/// Front of a parent: the skeletons of both children, with the response to loads on their partners
+/// subtracted.
 Compression::Impl::Front Compression::Impl::joined_front(Index c) {
   take_off(2 * c + 1);
   take_off(2 * c + 2);
@@ -296,7 +297,7 @@ Compression::Impl::Front Compression::Impl::joined_front(Index c) {
   return front;
 }
 
-/// Chooses the skeleton among the dofs of the front and carries loads and responses over to it.
+/// Chooses the skeleton among the dofs of the front and transfers loads and responses to it.
 void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   const Interpolation chosen = interpolate(
       front.response, front.W, cut * std::sqrt(double(samples) * double(end_dof(c) - first_dof(c))));
@@ -318,7 +319,7 @@ void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   front = std::move(thin);
 }
 
-/// Clusters of a level that have far pairs, or are inside of one that has.
+/// Clusters of a level with far pairs, or inside a cluster that has some.
 std::vector<Index> Compression::Impl::needed_of_level(int level) const {
   std::vector<Index> clusters;
   const Index first = matrix_.tree.first_of_level(level);
@@ -327,7 +328,7 @@ std::vector<Index> Compression::Impl::needed_of_level(int level) const {
   return clusters;
 }
 
-/// Where groups of clusters of a level begin that are solved together, and where the last one ends.
+/// Starts of the groups of clusters of a level that are solved together, and the end of the last one.
 std::vector<Index> Compression::Impl::groups_of(Index first, Index clusters) const {
   std::vector<Index> starts = {first};
   std::size_t columns = 0;
@@ -341,11 +342,11 @@ std::vector<Index> Compression::Impl::groups_of(Index first, Index clusters) con
   return starts;
 }
 
-/// The couplings of the far pairs in which the clusters [first, end) are columns: side by side in the body,
-/// they share most of a solve.
+/// Computes the couplings of the far pairs with the clusters [first, end) as columns: adjacent in the body,
+/// they have most of a solve in common.
 void Compression::Impl::couple(Index first, Index end, SelectedSolver::Workspace& workspace) {
   Dofs columns, rows;
-  std::map<Index, std::int64_t> row_of;  // where a cluster's skeleton begins
+  std::map<Index, std::int64_t> row_of;  // first row of a cluster's skeleton
   for (Index c = first; c < end; ++c) {
     const Dofs& skeleton = fronts_[at(c)].skeleton;
     columns.insert(columns.end(), skeleton.begin(), skeleton.end());
@@ -368,7 +369,7 @@ void Compression::Impl::couple(Index first, Index end, SelectedSolver::Workspace
   }
 }
 
-/// Takes the loads on the cluster's partners off its response.
+/// Subtracts the response to loads on the cluster's partners.
 void Compression::Impl::take_off(Index c) {
   Front& front = fronts_[at(c)];
   Rows by_partners = Rows::Zero(front.response.rows(), front.response.cols());
@@ -384,7 +385,7 @@ void Compression::Impl::take_off(Index c) {
     front.response.row(i) -= by_partners.row(i) / root_[front.skeleton[at(i)]];
 }
 
-/// The fronts of the clusters of a level, which are needed.
+/// Computes the fronts of the needed clusters of a level.
 bool Compression::Impl::make_fronts(int level, double cut, const std::function<bool(double)>& done) {
   const std::vector<Index> clusters = needed_of_level(level);
   SharedItems fronts;
@@ -407,8 +408,8 @@ bool Compression::Impl::make_fronts(int level, double cut, const std::function<b
   return true;
 }
 
-/// Here, where all processes have the front, so that all throw. Where all dofs are in the skeleton nothing is
-/// cut off, whatever the samples say.
+/// Throws OutOfReach if the rank is too high. Separate, since here all processes have the front and all
+/// throw. If all dofs are in the skeleton nothing is truncated, whatever the samples say.
 void Compression::Impl::check_rank(Index c) const {
   const auto rank = std::ssize(fronts_[at(c)].skeleton);
   if (rank <= samples - spare_samples || rank == fronts_[at(c)].V.rows()) return;
@@ -418,7 +419,7 @@ void Compression::Impl::check_rank(Index c) const {
                    "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
 }
 
-/// The couplings of the far pairs of a level.
+/// Computes the couplings of the far pairs of a level.
 bool Compression::Impl::make_couplings(int level, const std::function<bool(double)>& done) {
   const std::vector<Index> starts = groups_of(matrix_.tree.first_of_level(level), Index{1} << level);
   SharedItems groups;
@@ -463,12 +464,12 @@ bool Compression::Impl::climb(double cut) {
       fronts_[at(c)].W = {};
     }
   }
-  // Touches have workspaces of their own, and come next.
+  // Touches come next and have workspaces of their own.
   workspaces_ = std::vector<SelectedSolver::Workspace>(at(jobs_));
   return true;
 }
 
-/// Puts bases and couplings one after the other.
+/// Stores bases and couplings one after the other.
 HierarchicalMatrix Compression::Impl::packed() {
   const ClusterTree& tree = matrix_.tree;
   HierarchicalMatrix matrix = matrix_;
@@ -500,8 +501,9 @@ HierarchicalMatrix Compression::Impl::packed() {
   return matrix;
 }
 
-/// Skeletons have errors of their own: what loads that chose nothing tell beyond what pair_error has is
-/// shared out in proportion to the pairs. Their bases are orthonormal, but for L.
+/// Adds the errors of the skeletons to pair_error: the error that loads not used for choosing show beyond
+/// pair_error is distributed in proportion to the pairs' couplings, since their bases are orthonormal in the
+/// norms of L.
 bool Compression::Impl::check(HierarchicalMatrix& matrix) {
   std::vector<Index> nodes(at(matrix.tree.nodes));
   std::iota(nodes.begin(), nodes.end(), 0);

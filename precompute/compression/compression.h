@@ -1,4 +1,4 @@
-// Xi in nested low-rank form, from the factor, without ever having all of it.
+// Xi in nested low-rank form, computed from the factor without forming all of Xi.
 #pragma once
 
 #include <cstdint>
@@ -14,49 +14,50 @@
 
 namespace palpate {
 
-/// Loads that act on the whole body.
+/// Number of random loads, which act on the whole body.
 inline constexpr Index random_loads = 256;
 
-/// The parts that a compression has.
+/// Stages of a compression.
 enum class CompressionStage : std::uint8_t { near, samples, far };
 
-/// Told which share of a part is done; false stops.
+/// Called with the finished fraction of a stage; returns false to stop.
 using CompressionProgress = std::function<bool(CompressionStage, double)>;
 
-/// Gives the entries of the near pairs in which leaf [0, leaves) is the column, as `solve_near` did. Called
-/// by several threads at once, for each leaf in one of the processes that share the work.
+/// Provides the entries of the near pairs with leaf [0, leaves) as column, as computed by `solve_near`.
+/// Called by several threads at once, for each leaf in one of the processes that divide the work.
 using FetchNear = std::function<void(Index leaf, std::span<float> entries)>;
 
 /// Xi of the stored dofs as a HierarchicalMatrix.
 ///
-/// Near pairs are entries of Xi, exact but for their rounding to single. Of each cluster some dofs, its
-/// skeleton, are chosen by a pivoted QR of what random loads on all that is far from it do to it, and the
-/// rows of V say how the others follow them; the coupling of a far pair is then the block of Xi between two
-/// skeletons. What loads on the near do is taken off with the near pairs and, going up the tree, with the
-/// couplings of each level, so that the same random loads serve all levels (Boukaram and others, arXiv
-/// 2506.16759). Bases and couplings that are too fine so far are recompressed at last. The result does
-/// not depend on who shares the work.
+/// Near pairs are entries of Xi, exact except for their rounding to single. For each cluster some dofs, its
+/// skeleton, are chosen by a pivoted QR of the response to random loads on everything far from it; the rows
+/// of V express the other dofs by them. The coupling of a far pair is then the block of Xi between two
+/// skeletons. The response to near loads is subtracted by means of the near pairs and, going up the tree, of
+/// the couplings of each level, so that the same random loads serve all levels (Boukaram and others, arXiv
+/// 2506.16759). Bases and couplings, which are finer than needed until then, are recompressed at the end. The
+/// result does not depend on how the work is divided.
 class Compression {
  public:
-  /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by
-  /// reference.
+  /// `stored_dofs` [d N] are dofs of K, d per node, in the order of `nodes`, -1 if held. Keeps references to
+  /// all arguments.
   Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
               const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress);
   ~Compression();
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;
 
-  /// Solves for the near pairs in which leaf [0, leaves) is the column: pair after pair, resized. By thread
-  /// `worker` in [0, jobs); different leaves at once, before `prepare`.
+  /// Solves for the near pairs with leaf [0, leaves) as column: pair after pair, resized. Called by thread
+  /// `worker` in [0, jobs), for different leaves at once, before `prepare`.
   void solve_near(Index leaf, int worker, std::vector<float>& entries);
 
-  /// Takes the near pairs from `fetch`, or solves for them, and for random loads. False when `progress` said
-  /// stop. Throws OutOfReach where near pairs are indefinite in single precision.
+  /// Takes the near pairs from `fetch`, or solves for them, and solves for random loads. Returns false if
+  /// `progress` stopped it. Throws OutOfReach if near pairs are indefinite in single precision.
   bool prepare(const FetchNear& fetch = {});
 
-  /// The matrix, cut off where rows of L^-1 Xi L^-T, L the roots of the leaves, are moved by at most `cut` by
-  /// random loads of +-1 on all that is far (see `recompressed`). Once prepared, for any number of cuts. Null
-  /// when `progress` said stop. Throws OutOfReach where a rank would be above what the random loads can tell.
+  /// The matrix, truncated where rows of L^-1 Xi L^-T, with L the Cholesky factors of the leaves, change by
+  /// at most `cut` under random loads of +-1 on everything far (see `recompressed`). After `prepare`, for any
+  /// number of cuts. Null if `progress` stopped it. Throws OutOfReach if a rank exceeds what the random loads
+  /// can resolve.
   std::shared_ptr<HierarchicalMatrix> compress(double cut);
 
  private:
@@ -64,14 +65,14 @@ class Compression {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Tree and pairs of a matrix before it is made.
+/// Tree and pairs of a matrix that is yet to be computed.
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension);
 
-/// Multiplications and additions of the near pairs, from some of the leaves.
+/// Estimated multiplications and additions for the near pairs, from some of the leaves.
 double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dofs,
                   const HierarchicalMatrix& frame);
 
-/// Bytes that one thread takes, with solves of at least so many columns beside its own.
+/// Memory of one thread [byte], for solves of at least so many columns beside its own.
 std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame,
                                    std::int64_t columns);
 

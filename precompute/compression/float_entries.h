@@ -1,4 +1,4 @@
-// Entries in single precision that a hierarchical matrix shares.
+// Single precision entries of a hierarchical matrix.
 #pragma once
 
 #include <algorithm>
@@ -8,12 +8,12 @@
 
 namespace palpate {
 
-/// The place i of an array, which is not negative.
+/// Position i, not negative, of an array.
 inline std::size_t at(std::int64_t i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-/// Room for `count` entries, of one at least; not set.
+/// Uninitialised memory for `count` entries, at least one.
 inline std::shared_ptr<float[]> floats(std::int64_t count) {
   return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
 }

@@ -1,12 +1,12 @@
-// That Green's functions cannot be compressed.
+// Exception for Green's functions that cannot be compressed.
 #pragma once
 
 #include "base/error.h"
 
 namespace palpate {
 
-/// Thrown, by all processes that share the work alike, where Green's functions cannot be compressed as
-/// exactly as they are to be; nothing else is wrong with the body.
+/// Thrown, by all processes that divide the work, if Green's functions cannot be compressed to the tolerance;
+/// nothing else is wrong with the body.
 class OutOfReach : public Error {
  public:
   using Error::Error;

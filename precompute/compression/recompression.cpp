@@ -20,7 +20,7 @@ Matrix block(const std::shared_ptr<const float[]>& entries, std::int64_t first, 
   return Eigen::Map<const FloatRows>(entries.get() + first, rows, columns).cast<double>();
 }
 
-/// The block of Xi of a leaf with itself.
+/// Block of Xi of a leaf with itself.
 Matrix own_block(const HierarchicalMatrix& matrix, Index leaf) {
   const Index c = matrix.tree.first_leaf() + leaf;
   const Eigen::Index n = Eigen::Index{matrix.dimension} * (matrix.tree.end(c) - matrix.tree.begin(c));
@@ -62,7 +62,7 @@ class Recompression {
     return clusters;
   }
 
-  /// work(c) and carry(c, results) for those.
+  /// Calls work(c) and carry(c, results) for the clusters of a level.
   template <class Work, class Carry>
   bool for_level(int level, Work&& work, Carry&& carry) {
     const std::vector<Index> clusters = clusters_of(level);
@@ -86,7 +86,7 @@ class Recompression {
     return true;
   }
 
-  /// S between orthonormal bases.
+  /// Transforms S to orthonormal bases.
   bool turn_couplings() {
     SharedItems pairs;
     pairs.count = std::ssize(S_);
@@ -125,7 +125,7 @@ class Recompression {
     return true;
   }
 
-  /// Q R of a leaf's L^-1 V, and of the children's R E.
+  /// Computes Q R of a leaf's L^-1 V, or of the children's R E.
   void orthogonalise(Index c) {
     Matrix V;
     if (is_leaf(c)) {
@@ -145,7 +145,7 @@ class Recompression {
     R_[at(c)] = qr.matrixQR().topRows(k).triangularView<Eigen::Upper>();
   }
 
-  /// What far loads do to a cluster, in its orthonormal basis: their covariance.
+  /// Computes the covariance of a cluster's response to far loads, in its orthonormal basis.
   void weigh(Index c) {
     const Eigen::Index k = Q_[at(c)].cols();
     Matrix G = Matrix::Zero(k, k);
@@ -165,11 +165,11 @@ class Recompression {
     weights_[at(c)] = std::move(G);
   }
 
-  /// Drops the directions without which no row of the cluster's leaves is moved by more than the cut.
+  /// Drops directions as long as no row of the cluster's leaves changes by more than the cut.
   void truncate(Index c) {
     rows_[at(c)] = spread_out(c);
     const Eigen::SelfAdjointEigenSolver<Matrix> eigen(weights_[at(c)]);
-    const Matrix V = rows_[at(c)] * eigen.eigenvectors();  // least first
+    const Matrix V = rows_[at(c)] * eigen.eigenvectors();  // smallest first
     const Eigen::Index k = V.cols();
     Eigen::ArrayXd tail = Eigen::ArrayXd::Zero(V.rows());
     Eigen::Index dropped = 0;
@@ -180,7 +180,8 @@ class Recompression {
     U_[at(c)] = eigen.eigenvectors().rightCols(k - dropped).rowwise().reverse();
   }
 
-  /// Here, where all processes have the rank, so that all throw.
+  /// Throws OutOfReach if the rank is too high. Separate, since here all processes have the rank and all
+  /// throw.
   void check_rank(Index c) const {
     const Eigen::Index kept = U_[at(c)].cols();
     if (kept <= most_rank) return;
@@ -190,7 +191,7 @@ class Recompression {
                      "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
   }
 
-  /// The orthonormal basis of a cluster, a row for each of its dofs.
+  /// Orthonormal basis of a cluster, one row per dof.
   [[nodiscard]] Matrix spread_out(Index c) {
     if (is_leaf(c)) return Q_[at(c)];
     const Matrix &a = rows_[at(2 * c + 1)], &b = rows_[at(2 * c + 2)];
@@ -199,26 +200,25 @@ class Recompression {
     return V;
   }
 
-  /// The rows of a parent's Q that belong to a child.
+  /// Rows of a parent's Q that belong to a child.
   [[nodiscard]] Matrix part(Index parent, Index child) const {
     const Matrix& Q = Q_[at(parent)];
     const Eigen::Index first = Q_[at(2 * parent + 1)].cols();
     return child == 2 * parent + 1 ? Q.topRows(first) : Q.bottomRows(Q.rows() - first);
   }
 
-  /// E of a child with the bases that are kept.
+  /// E of a child for the truncated bases.
   [[nodiscard]] Matrix transfer_of(Index parent, Index child) const {
     return U_[at(child)].transpose() * part(parent, child) * U_[at(parent)];
   }
 
-  /// S of a pair with these bases.
+  /// S of a pair for the truncated bases.
   [[nodiscard]] Matrix coupling_of(std::size_t pair) const {
     const auto [row, column] = from_.far_pair[pair];
     return U_[at(row)].transpose() * S_[pair].cast<double>() * U_[at(column)];
   }
 
-  /// With V' the basis of a cluster that is kept, nested as it is stored, and V that of before: V^T V' and
-  /// V'^T V'.
+  /// V^T V' and V'^T V', with V' the truncated basis of a cluster, nested as stored, and V the one before.
   struct Products {
     Matrix with_old, with_itself;
   };
@@ -260,7 +260,7 @@ class Recompression {
     return matrix;
   }
 
-  /// Couplings, and the errors |V S V^T - V' S' V'^T| of pairs, Frobenius' norm.
+  /// Computes the couplings, and the errors |V S V^T - V' S' V'^T| of pairs, in the Frobenius norm.
   bool pack_couplings(HierarchicalMatrix& matrix) {
     const std::vector<Products> all = products();
     const std::shared_ptr<float[]> coupling = floats(matrix.coupling_at.back());
@@ -295,7 +295,7 @@ class Recompression {
         const Matrix own = own_block(matrix, static_cast<Index>(leaf));
         Matrix V = L_[at(leaf)].triangularView<Eigen::Lower>() * (Q_[at(c)] * U_[at(c)]);
         for (Eigen::Index i = 0; i < V.rows(); ++i)
-          if (own(i, i) == 0.0) V.row(i).setZero();  // held: but for rounding it is zero
+          if (own(i, i) == 0.0) V.row(i).setZero();  // held: zero except for rounding
         put(V, basis.get() + matrix.basis_at[at(leaf)]);
       }
       const Index parent = ClusterTree::parent(c);

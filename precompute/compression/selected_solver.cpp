@@ -51,7 +51,7 @@ void SelectedSolver::solve(std::span<const std::int64_t> rows, std::span<const s
   }
 }
 
-/// Both substitutions over what is marked.
+/// Runs both substitutions over the marked supernodes.
 void SelectedSolver::sweep(std::int64_t width, Workspace& workspace) const {
   SupernodalSweeps::Workspace& sweep = workspace.sweep;
   const std::span<const Supernode> supernodes = sweeps_.supernodes();

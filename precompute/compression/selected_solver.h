@@ -1,4 +1,4 @@
-// Blocks of Xi = K^-1 for chosen rows and columns, from a supernodal Cholesky factor.
+// Blocks of Xi = K^-1 for selected rows and columns, from a supernodal Cholesky factor.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace palpate {
 
-/// Entries of Xi at chosen rows and columns: forward substitution visits the paths of the elimination tree
-/// from the columns to the root, backward substitution those from the rows, and nothing else. What is near in
-/// the body shares most of its path. Const: any number of threads may solve.
+/// Solver for entries of Xi at selected rows and columns: forward substitution visits only the paths of the
+/// elimination tree from the columns to the root, backward substitution those from the rows. Dofs that are
+/// near each other in the body have most of their paths in common. Const: any number of threads may solve.
 class SelectedSolver {
  public:
   /// Scratch of one thread.
@@ -22,12 +22,13 @@ class SelectedSolver {
 
   explicit SelectedSolver(const Factor& factor);
 
-  /// Xi(rows, columns) [rows x columns] row-major [m/N] to `block`. Rows and columns are dofs of K; those of
-  /// -1 are held and have zeros.
+  /// Xi(rows, columns) [rows x columns] row-major [m/N] to `block`. Rows and columns are dofs of K; -1 is a
+  /// held dof, with zeros.
   void solve(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns, Workspace& workspace,
              std::span<double> block) const;
 
-  /// u = Xi f for loads f [dofs x columns] on some dofs, and their displacements u, both row-major.
+  /// u = Xi f for loads f [dofs x columns] on some dofs, with displacements u of the same dofs, both
+  /// row-major.
   void multiply(std::span<const std::int64_t> dofs, std::int64_t columns, std::span<const double> f,
                 Workspace& workspace, std::span<double> u) const;
 

@@ -1,4 +1,4 @@
-// model.toml: what a person writes to describe a body. Keys are documented in docs/model-toml.md.
+// model.toml: the user's description of a body. docs/model-toml.md documents the keys.
 #pragma once
 
 #include <filesystem>
@@ -24,17 +24,17 @@ struct ValueRange {
   double low, high;
 };
 
-/// Labelled image (INR, NIfTI, NRRD). Every non-zero label is body unless `labels` lists those that are, or
-/// of a grey image `range` says which values are. With `regions` the elements keep their label as region and
-/// the mesh follows the interfaces between labels.
+/// Labelled image (INR, NIfTI, NRRD). Every non-zero label is body, unless `labels` lists the ones that are
+/// or, for a grey image, `range` gives the values that are. With `regions` the elements keep their label as
+/// region and the mesh follows the interfaces between labels.
 struct ImageGeometry {
   std::filesystem::path file;
   std::vector<int> labels;            ///< empty: all non-zero ones
   bool regions = false;               ///< labels are materials: some [[material]] has regions
-  std::optional<ValueRange> range{};  ///< these values are the body, a single tissue
+  std::optional<ValueRange> range{};  ///< values of the body, a single tissue
 };
 
-/// Mesh made elsewhere (.msh, .mesh, .node/.ele, .vtk), in any case of letters.
+/// Mesh made by another program (.msh, .mesh, .node/.ele, .vtk), in any case of letters.
 struct VolumeGeometry {
   std::filesystem::path file;
 };
@@ -45,12 +45,12 @@ struct PolygonGeometry {
   std::vector<std::vector<Vec3>> holes;
 };
 
-/// Black-and-white picture (PNG, PBM): the pixels that are not black are the body (Sito), or those that are.
-/// A pixel is a square of one geometry unit; x to the right, y up, the lower left corner of the picture at
-/// the origin.
+/// Black-and-white picture (PNG, PBM): the body is the pixels that are not black (Sito), or with `dark` the
+/// black ones. A pixel is a square of one geometry unit; x to the right, y up, the lower left corner of the
+/// picture at the origin.
 struct PictureGeometry {
   std::filesystem::path file;
-  bool dark = false;  ///< what is black is the body
+  bool dark = false;  ///< the body is black
 };
 
 using Geometry = std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, PolygonGeometry,
@@ -58,39 +58,39 @@ using Geometry = std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, Po
 
 enum class Mesher : std::uint8_t { tetgen, cgal };
 
-/// How the body is meshed. Lengths in metres after scaling.
+/// Options for meshing. Lengths in metres after scaling.
 struct MeshOptions {
-  /// Kind of the elements; empty: the natural one of the geometry (tet4; quad4 for rectangles; tri3 for
-  /// polygons and pictures; what the file has).
+  /// Kind of the elements; empty: the default of the geometry (tet4; quad4 for rectangles; tri3 for polygons
+  /// and pictures; for volume meshes the file's).
   std::optional<ElementType> element;
-  Mesher mesher = Mesher::tetgen;  ///< surfaces and images; images: cgal unless told otherwise
-  bool mesher_chosen = false;      ///< model.toml names it: another one does not take its place
-  /// Target at the boundary [m]. Required for images, polygons, pictures and with remesh; otherwise the mean
-  /// edge of the surface.
+  Mesher mesher = Mesher::tetgen;  ///< for surfaces and images; images: cgal by default
+  bool mesher_chosen = false;      ///< named in model.toml: no other mesher replaces it
+  /// Target length at the boundary [m]. Required for images, polygons, pictures and with remesh; otherwise
+  /// the mean edge of the surface.
   std::optional<double> edge_length;
   bool remesh = false;   ///< surfaces: isotropic remeshing to edge_length before meshing
   double grading = 0.5;  ///< growth of the target edge length per length below the boundary [-]; 0 is uniform
   double radius_edge = 2.0;     ///< bound on circumradius / shortest edge [-]; not for plane meshes
-  double min_dihedral = 10.0;   ///< tetgen: bound asked of TetGen [degree]
+  double min_dihedral = 10.0;   ///< tetgen: bound passed to TetGen [degree]
   double facet_distance = 0.0;  ///< cgal: boundary approximation error [m]; 0: images, the largest side of a
                                 ///< voxel; surfaces, a twentieth of edge_length
-  double feature_angle =
-      60.0;             ///< cgal on surfaces: edges whose faces turn by more are kept [degree]; 180: none
-  bool odt = false;     ///< cgal: global optimisation by optimal Delaunay triangulation
-  bool lloyd = false;   ///< cgal: global optimisation by centroidal Voronoi (and of plane meshes)
-  bool perturb = true;  ///< cgal: sliver perturbation, after odt or lloyd
-  bool exude = true;    ///< cgal: sliver exudation, last
+  double feature_angle = 60.0;  ///< cgal on surfaces: edges with a larger angle between their faces are kept
+                                ///< [degree]; 180: none
+  bool odt = false;             ///< cgal: global optimisation by optimal Delaunay triangulation
+  bool lloyd = false;           ///< cgal: global optimisation by centroidal Voronoi (and of plane meshes)
+  bool perturb = true;          ///< cgal: sliver perturbation, after odt or lloyd
+  bool exude = true;            ///< cgal: sliver exudation, last
 };
 
 /// Nodes held along some axes, at a prescribed displacement.
 struct Fixing {
   Selection where;
-  std::uint8_t axes = 7;             ///< bit `axis` is set where held
+  std::uint8_t axes = 7;             ///< bit `axis` is set if held
   Vec3 displacement = Vec3::Zero();  ///< along the held axes [m]
 };
 
-/// A material and the elements that are made of it: those of its regions, by number or by the names that the
-/// mesh file gives them, those that its selection holds, or (none given) those that no other material claims.
+/// A material and its elements: those of its regions, by number or by the mesh file's names, those in its
+/// selection, or (none given) those that no other material claims.
 struct MaterialPart {
   Material material;
   std::vector<Index> regions;
@@ -103,8 +103,8 @@ struct NodalForce {
   Vec3 force;
   Selection where;
 };
-/// Force per area [N/m^2] on the boundary facets that have the tag, or all of whose nodes are selected; in
-/// the plane it acts over the thickness.
+/// Force per area [N/m^2] on the boundary facets with the tag, or whose nodes are all selected; in the plane
+/// it acts over the thickness.
 struct Traction {
   Vec3 traction;
   Selection where;
@@ -115,35 +115,35 @@ struct Gravity {
 };
 using Load = std::variant<NodalForce, Traction, Gravity>;
 
-/// Overlays that are condensed ahead: one round each surface node in the regions.
+/// Overlays condensed in advance: one around each surface node in the regions.
 struct OverlayRegions {
   int refinement = 3;  ///< each element is cut into r^d
-  int rings = 2;       ///< of elements round the node
+  int rings = 2;       ///< of elements around the node
   std::vector<Selection> regions;
 };
 
-/// Swinging after the body is let go.
+/// Options for dynamics.
 struct DynamicsOptions {
-  std::optional<DynamicsMethod> method;  ///< packed or modal; empty: what fits
+  std::optional<DynamicsMethod> method;  ///< packed or modal; empty: the one that fits
   bool lumped = false;                   ///< M is diagonal
   Newmark newmark;
   Rayleigh damping;
-  std::optional<Index> modes;  ///< modal: how many; empty: 100, or all where there are fewer
-  std::string place;           ///< of `modes`, else of the table: file, line and column, for errors
+  std::optional<Index> modes;  ///< modal: number of modes; empty: 100, or all if there are fewer
+  std::string place;           ///< place of `modes`, else of the table: file, line and column, for errors
 };
 
-/// A study of how far the body may turn until small strain and warping are wrong.
+/// Options of a study of the rotation up to which small strain and warping are accurate.
 struct WarpOptions {
-  std::optional<Selection> where;         ///< what is loaded; empty: the free end
-  std::optional<Vec3> direction;          ///< of the force at rest; empty: along which that gives way most
-  double angle = 0.5 * std::numbers::pi;  ///< rotation of the surface at which it ends [rad]
-  Index levels = 12;                      ///< of the force until then, about
-  std::string place;                      ///< of the table: file, line and column, for errors
+  std::optional<Selection> where;         ///< loaded nodes; empty: the free end
+  std::optional<Vec3> direction;          ///< of the force at rest; empty: the direction of least stiffness
+  double angle = 0.5 * std::numbers::pi;  ///< rotation of the surface at which the study ends [rad]
+  Index levels = 12;                      ///< approximate number of forces until then
+  std::string place;                      ///< place of the table: file, line and column, for errors
 };
 
-/// How the Green's functions are stored.
+/// Storage form of the Green's functions.
 enum class StorageForm : std::uint8_t {
-  automatic,   ///< compressed where there are many stored nodes
+  automatic,   ///< compressed if there are many stored nodes
   packed,      ///< every entry
   compressed,  ///< in nested low-rank form, H^2
 };
@@ -163,9 +163,9 @@ struct Description {
   std::vector<Load> loads;
   Scope scope = Scope::layers;
   Index layers = 1;
-  std::optional<Precision> precision;  ///< empty: the first that is good enough (precision.h)
+  std::optional<Precision> precision;  ///< empty: the first that is accurate enough (precision.h)
   StorageForm form = StorageForm::automatic;
-  double tolerance = 0.005;  ///< compressed: most that forces may be off, relative to the largest [-]
+  double tolerance = 0.005;  ///< compressed: largest allowed force error, relative to the largest force [-]
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
   std::optional<WarpOptions> warp;

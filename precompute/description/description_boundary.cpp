@@ -12,7 +12,7 @@ constexpr double degree = std::numbers::pi / 180.0;
 constexpr double most_warp_angle = 150.0;  // [degree]
 constexpr Index most_warp_levels = 200;
 
-/// Bit `axis` is set for each letter.
+/// Reads axes: bit `axis` is set for each letter.
 std::uint8_t read_axes(const TomlTable& entry, int dimension) {
   const std::string letters = dimension == 3 ? "xyz" : "xy";
   if (!entry.has("axes")) {

@@ -15,7 +15,7 @@ bool is_control(char c) {
   return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
 }
 
-/// Six elements a cell must stay within the 32-bit element numbers.
+/// Throws Error if six elements per cell exceed 32-bit element numbers.
 void check_cells(const TomlTable& shape, std::string_view key, double cells) {
   if (6.0 * cells > std::numeric_limits<Index>::max()) {
     shape.fail(key, shape.name_of(key) + " asks for too many cells: " + shown(cells),
@@ -47,7 +47,7 @@ PolygonGeometry read_polygon(const TomlTable& polygon) {
   return result;
 }
 
-/// Cells over a diameter, of a body that is `cells_along` long; as many where that is not given.
+/// Cells over the diameter of a body with `cells_along` cells along it; the same number if it is not given.
 int read_cells_across(const TomlTable& shape, std::optional<int> cells_along = {}) {
   const int cells = shape.count("cells_across");
   check_cells(shape, "cells_across", double{1} * cells * cells * cells_along.value_or(cells));

@@ -60,7 +60,7 @@ KeyTable geometry() {
         "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
 }
 
-// Tables of a shape.
+// Tables of shapes.
 
 KeyTable box() {
   return {"[geometry] box",
@@ -120,7 +120,7 @@ KeyTable mesh() {
         "`\"perturb\"` and `\"exude\"` (remove slivers); in the plane only `\"lloyd\"`"}}};
 }
 
-/// What the constants of a material apply to.
+/// Keys for the application of a material's constants.
 KeyTable material() {
   return {
       "[material]",
@@ -149,7 +149,7 @@ KeyTable selection() {
         alternative}}};
 }
 
-// Tables of a selection.
+// Tables of selections.
 
 KeyTable select_box() {
   return {"selection box", {{"min", "m", "required", ""}, {"max", "m", "required", ""}}};

@@ -12,7 +12,7 @@ namespace {
 
 const Keys claim_kinds = alternatives_of("[material]");
 
-/// One constant, where it is given; in the plane a list has no strains across it.
+/// Reads one constant if given; in the plane a list has no strains out of the plane.
 void read_field(const TomlTable& material, const MaterialField& field, std::span<double> values,
                 int dimension) {
   if (!field.required && !material.has(field.key)) return;

@@ -41,7 +41,7 @@ Json constants_json() {
   return all;
 }
 
-/// A kind without a choice of meshers has keys for the mesher "".
+/// Kinds of geometry; one without a choice of meshers has keys for the mesher "".
 Json geometries_json() {
   Json all = Json::array();
   for (const std::string_view kind : alternatives_of("[geometry]")) {

@@ -1,13 +1,13 @@
-// Files that are given in the place of a model.toml.
+// Files given in place of a model.toml.
 #pragma once
 
 #include <filesystem>
 
 namespace palpate {
 
-/// Throws Error for a file that exists and is something else than a model.toml: a surface, an image, a volume
-/// mesh or a picture, of which it shows a model.toml to begin with; a kind that is not read, with the command
-/// that makes one that is (formats/file_kinds.h); an unknown one; a folder.
+/// Throws Error for an existing file that is not a model.toml: for a surface, an image, a volume mesh or a
+/// picture with a model.toml to start from; for a kind that is not read with the command that converts it
+/// (formats/file_kinds.h); for an unknown kind; for a folder.
 void check_is_description(const std::filesystem::path& path);
 
 }  // namespace palpate

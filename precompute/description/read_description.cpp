@@ -41,7 +41,8 @@ double read_thickness(const TomlTable& root, Analysis analysis) {
   return root.positive("thickness", 1.0);
 }
 
-/// In the plane the inside is cheap and is looked at: without scope and layers, all of it is kept.
+/// Reads the scope. In the plane the interior is cheap and visible: without scope and layers, all of it is
+/// kept.
 Scope read_scope(const TomlTable& storage, int dimension) {
   const std::string usual = dimension == 2 && !storage.has("layers") ? "full" : "layers";
   const std::string scope =
@@ -51,7 +52,7 @@ Scope read_scope(const TomlTable& storage, int dimension) {
   return scope == "layers" ? Scope::layers : Scope::full;
 }
 
-/// Without Green's functions there is nothing for these to be about.
+/// Throws Error for settings that need Green's functions.
 void check_without_greens(const TomlTable& root, const TomlTable& storage) {
   for (const char* key : {"precision", "compression", "tolerance"}) {
     if (storage.has(key))
@@ -66,7 +67,7 @@ void check_without_greens(const TomlTable& root, const TomlTable& storage) {
   }
 }
 
-constexpr double least_tolerance = 1e-4;  // of compression: below it packed storage is no larger
+constexpr double least_tolerance = 1e-4;  // of compression; below it packed storage is no larger
 
 Index read_layers(const TomlTable& storage, Scope scope) {
   if (scope == Scope::layers) {
@@ -79,7 +80,7 @@ Index read_layers(const TomlTable& storage, Scope scope) {
   return 0;
 }
 
-/// Empty for "auto".
+/// Reads the precision; nullopt for "auto".
 std::optional<Precision> read_precision(const TomlTable& storage) {
   if (!storage.has("precision")) return std::nullopt;
   const std::string name = storage.choice("precision", {"auto", "single", "split", "double"});
@@ -112,7 +113,7 @@ double read_tolerance(const TomlTable& storage, StorageForm form) {
   return tolerance;
 }
 
-/// The name becomes a file name.
+/// Reads the name, which becomes a file name.
 std::string read_name(const TomlTable& root) {
   std::string name = root.text("name");
   const bool printable =
@@ -124,7 +125,7 @@ std::string read_name(const TomlTable& root) {
   return name;
 }
 
-/// The image's labels stay apart in the mesh where materials need them.
+/// Keeps the image's labels apart in the mesh if materials need them.
 void keep_regions(const TomlTable& table, Geometry& geometry, const std::vector<MaterialPart>& materials) {
   if (auto* image = std::get_if<ImageGeometry>(&geometry)) {
     image->regions = std::any_of(materials.begin(), materials.end(),
@@ -135,7 +136,7 @@ void keep_regions(const TomlTable& table, Geometry& geometry, const std::vector<
   }
 }
 
-/// mesh = "part.vtk": the file says what the key should be, better than the nearest word does.
+/// Throws Error for mesh = "part.vtk": the file's kind indicates the right key better than the nearest word.
 void refuse_files_under_other_keys(const toml::table& table, const TomlTable& root) {
   const toml::table* const geometry = table["geometry"].as_table();
   if (geometry == nullptr) return;

@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::string_view repaired_mark = "# repaired by palpate-precompute\n";  // OutputKind::surface
 constexpr double picture_thickness = 0.01;                                        // [m]
-constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // of the edge
+constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // relative to the edge
 
-/// In the shape's unit. Of the surface nodes of tet10 three in four are middles of edges.
+/// Edge length in the shape's unit. Of the surface nodes of tet10 three in four are middles of edges.
 double edge_in_file(const Shape& shape, const DraftOptions& options) {
   const int nodes = options.shape.nodes_of(shape.kind);
   if (shape.kind == ShapeKind::picture) return shape.boundary / nodes;
@@ -38,13 +38,13 @@ DraftValues values_of(const Shape& shape, const DraftOptions& options) {
   return options.values.value_or(usual_values(shape.kind));
 }
 
-/// A picture has no unit: its body is 10 cm long.
+/// Unit of a picture, which has none: its body is 10 cm long.
 UnitGuess unit_of_pixels(double longest_side) {
   const std::string metres = fmt::format("{:.3g}", 0.1 / longest_side);
   return {*read_unit(metres), fmt::format("the body is {} pixels long, and so 10 cm", longest_side)};
 }
 
-/// The unit of the lengths as they are read: millimetres for an image whose header says its unit.
+/// Unit of the lengths as read: millimetres for an image whose header has a unit.
 UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
   if (options.unit) {
     LengthUnit given = *options.unit;
@@ -58,7 +58,7 @@ UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
 
 constexpr std::string_view drafted_mark = "# Drafted by palpate-precompute from ";
 
-/// Whether a description was made from this shape, or from the surface that it was repaired to.
+/// True if a description was made from this shape, or from its repaired surface.
 bool is_made_from(const Description& description, const std::filesystem::path& file) {
   const std::filesystem::path source = std::visit(
       [](const auto& geometry) -> std::filesystem::path {
@@ -77,8 +77,8 @@ bool is_made_from(const Description& description, const std::filesystem::path& f
          description.text.starts_with(std::string(drafted_mark) + printable(file.filename().string()) + ".");
 }
 
-/// A description that is there is a person's: it is used, not written over. Throws Error for one of another
-/// file, which has the same name but for its ending.
+/// Keeps an existing description, which is the user's. Throws Error if it is of another file, whose name
+/// differs in the ending only.
 void use_existing(const std::filesystem::path& file, const std::filesystem::path& description,
                   bool has_options, const Tell& tell) {
   if (has_options)
@@ -95,7 +95,7 @@ void use_existing(const std::filesystem::path& file, const std::filesystem::path
     tell("note: " + printable(file.string()) + " is newer: --renew takes it into account");
 }
 
-/// The description names it.
+/// Throws Error unless the name is UTF-8, as the description contains it.
 void expect_utf8_name(const std::filesystem::path& file) {
   const nlohmann::json name = file.filename().string();
   if (nlohmann::json::parse(json_text(name)) != name)
@@ -103,13 +103,13 @@ void expect_utf8_name(const std::filesystem::path& file) {
                 "rename the file");
 }
 
-/// The surface that a shape has been repaired to, in a file beside it.
+/// Repaired surface of a shape, in a file beside it.
 class RepairedFile {
  public:
   RepairedFile(std::filesystem::path file, std::filesystem::path folder, bool keep)
       : file_(std::move(file)), folder_(std::move(folder)), keep_(keep) {}
 
-  /// Returns where it is: in the shape's own file where nothing was repaired.
+  /// Writes the surface and returns its path: the shape's own file if nothing was repaired.
   std::filesystem::path write(const Shape& shape) {
     if (shape.repaired.triangles.empty()) return file_;
     std::string text = off_text(shape.repaired);
@@ -135,8 +135,8 @@ class RepairedFile {
   bool keep_;
 };
 
-/// Some surfaces intersect themselves once they have the edge length of the mesh, where they are thinner than
-/// that. These are wrapped, ever more thickly, until they do not; the last wrapping is taken as it is.
+/// Some surfaces intersect themselves after remeshing to the edge length of the mesh, where they are thinner
+/// than that. These are wrapped, with growing offset, until they do not; the last wrapping is accepted.
 std::filesystem::path make_meshable(const std::filesystem::path& file, const std::filesystem::path& folder,
                                     double edge, bool keep, Shape& shape) {
   RepairedFile repaired(file, folder, keep);
@@ -177,7 +177,7 @@ void tell_decisions(const Shape& shape, const UnitGuess& unit, const DraftOption
                    values.poissons_ratio, values.percent, values.down));
 }
 
-/// The end of a picture's description.
+/// End of a picture's description.
 std::string picture_text(const DraftValues& values) {
   return fmt::format(
       "\n[material]\nyoungs_modulus = {}  # pascals: jelly\npoissons_ratio = {}\n"

@@ -13,13 +13,13 @@ namespace {
 constexpr std::array<std::pair<std::string_view, double>, 5> named_units = {
     {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}, {"um", 1e-6}, {"in", 0.0254}}};
 
-/// A unit, and how long bodies are that files in it hold [m].
+/// A unit, and the usual lengths of bodies in files that have it [m].
 struct Usual {
   std::string_view name;
   double metres, shortest, longest;
 };
 
-// Most surfaces are in millimetres, as CAD and segmentation write them; those in metres are smaller than 1.
+// Most surfaces are in millimetres, as written by CAD and segmentation; those in metres are smaller than 1.
 constexpr std::array<Usual, 3> usual_units = {
     {{"mm", 0.001, 0.02, 2.0}, {"m", 1.0, 0.02, 0.5}, {"cm", 0.01, 0.02, 0.5}}};
 

@@ -1,4 +1,4 @@
-// In which unit a file counts.
+// Units of length of files.
 #pragma once
 
 #include <optional>
@@ -9,28 +9,28 @@ namespace palpate {
 
 /// A unit of length.
 struct LengthUnit {
-  std::string name;     ///< "mm", or "1 unit = 0.1 m" for what has no name
+  std::string name;     ///< "mm", or "1 unit = 0.1 m" without a name
   double metres = 1.0;  ///< [m] per unit
 };
 
-/// How units may be written, for help.
+/// Spellings of units, for help.
 inline constexpr const char* unit_choices = "m|cm|mm|um|in|METRES";
 
-/// What a person writes: a unit's name, or metres per unit. Nothing where it is neither.
+/// Reads a unit's name, or metres per unit. Nullopt if it is neither.
 std::optional<LengthUnit> read_unit(std::string_view text);
 
-/// A unit that a size speaks for.
+/// A unit inferred from a size.
 struct UnitGuess {
   LengthUnit unit;
   std::string why;  ///< a clause, for "the unit is ..."
 };
 
-/// From the longest side of a body > 0 [file units], by what organs and samples measure: the first of mm, m
-/// and cm that makes it 2 cm to 50 cm (mm: to 2 m) long; where none does, the power of ten of a metre that
-/// makes it 10 cm to 1 m long.
+/// Unit guessed from the longest side of a body > 0 [file units], by typical sizes of organs and samples: the
+/// first of mm, m and cm that makes it 2 cm to 50 cm (mm: to 2 m) long; if none does, the power of ten of a
+/// metre that makes it 10 cm to 1 m long.
 UnitGuess guess_unit(double longest_side);
 
-/// A length as a person says it: "15 cm", "3.1 mm".
+/// A length in everyday units: "15 cm", "3.1 mm".
 std::string length_text(double metres);
 
 }  // namespace palpate

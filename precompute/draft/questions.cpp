@@ -14,10 +14,10 @@
 namespace palpate {
 namespace {
 
-/// Takes an answer, and returns what is wrong with it, empty for nothing.
+/// Handles an answer and returns what is wrong with it, or an empty text.
 using Take = std::function<std::string(const std::string& answer)>;
 
-/// Blanks at both ends are nobody's answer.
+/// Text without blanks at both ends.
 std::string trimmed(const std::string& line) {
   const std::size_t begin = line.find_first_not_of(" \t\r");
   if (begin == std::string::npos) return "";
@@ -43,7 +43,7 @@ void ask(const Conversation& with, const std::string& question, const std::strin
   }
 }
 
-/// Asks for a number in a range, its ends excluded.
+/// Asks for a number in an open interval.
 double ask_number(const Conversation& with, const std::string& question, double otherwise, double above,
                   double below) {
   double number = otherwise;

@@ -1,4 +1,4 @@
-// A description by questions and answers.
+// Description by questions and answers.
 #pragma once
 
 #include <filesystem>
@@ -8,16 +8,16 @@
 
 namespace palpate {
 
-/// Who is asked.
+/// Streams of the questions and answers.
 struct Conversation {
   std::istream& answers;
   std::ostream& questions;
-  bool is_terminal = false;  ///< there a wrong answer is asked for again; from a pipe it is an error
+  bool is_terminal = false;  ///< a wrong answer is asked for again; from a pipe it is an error
 };
 
-/// Asks for what a description of a surface or an image needs, each with a default that an empty line takes,
-/// and writes it as `draft` does. `file` is asked for where it is empty. Returns the description's file.
-/// Throws Error as `draft` does, for a wrong answer from a pipe, and where the answers end too early.
+/// Asks for the data of a surface's or an image's description, each with a default that an empty line
+/// accepts, and writes it as `draft` does. Asks for `file` if it is empty. Returns the description's file.
+/// Throws Error as `draft` does, for a wrong answer from a pipe, and if the answers end too early.
 std::filesystem::path draft_by_questions(std::filesystem::path file, DraftOptions options,
                                          const Conversation& with);
 

@@ -51,7 +51,7 @@ Shape read_repaired_surface(const std::filesystem::path& file, const ShapeOption
   return shape;
 }
 
-/// Sides of voxels between body and not-body.
+/// Area of voxel sides between body and background.
 double boundary_area(const VoxelBody& body) {
   const std::array<std::size_t, 3> step = {body.at(1, 0, 0), body.at(0, 1, 0), body.at(0, 0, 1)};
   double sum = 0.0;
@@ -73,11 +73,11 @@ Shape read_image(const std::filesystem::path& file, const std::optional<ValueRan
   for (int axis = 0; axis < 3; ++axis)  // less the empty rim of two voxels on each side
     shape.size[axis] = body.spacing[axis] * (body.size.at(static_cast<std::size_t>(axis)) - 4);
   shape.boundary = boundary_area(body);
-  shape.repairs.clear();  // the bake tells them
+  shape.repairs.clear();  // the bake reports them
   return shape;
 }
 
-/// Whether more than half of the pixels along the picture's edges are body, as paper is.
+/// True if more than half of the pixels along the picture's edges are body, as paper is.
 bool is_paper(const PixelBody& body) {
   Index rim = 0, inside = 0;
   for (Index j = 0; j < body.height; ++j) {
@@ -98,9 +98,9 @@ Shape read_picture_shape(const std::filesystem::path& file) {
   Shape shape;
   shape.kind = ShapeKind::picture;
   PixelBody body = read_picture({file});
-  shape.dark = is_empty(body) || is_paper(body);  // dark on what is transparent has nothing light
+  shape.dark = is_empty(body) || is_paper(body);  // dark on a transparent ground has nothing light
   if (shape.dark) body = read_picture({file, true});
-  std::vector<std::string> notes;  // the bake tells them
+  std::vector<std::string> notes;  // the bake reports them
   keep_one_body(body, file.string(), notes);
   Eigen::AlignedBox2i box;
   for (const std::vector<LatticePoint>& outline : trace_outlines(body)) {

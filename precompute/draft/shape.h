@@ -1,4 +1,4 @@
-// A surface, an image or a picture that a person has, and what it takes to use it.
+// A surface, an image or a picture, and its measures for a draft.
 #pragma once
 
 #include <cstdint>
@@ -12,38 +12,39 @@
 
 namespace palpate {
 
-/// What a file describes a body by.
+/// Kind of file that describes a body.
 enum class ShapeKind : std::uint8_t {
   surface,
   image,    ///< labelled, in space
   picture,  ///< of a body in the plane
 };
 
-/// By the file's name; nothing for every other file.
+/// Kind by the file's name; nullopt for any other file.
 std::optional<ShapeKind> shape_kind(const std::filesystem::path& file);
 
-/// The file's name without folder and ending: "organ" of "in/organ.inr.gz".
+/// Name of a file without folder and ending: "organ" of "in/organ.inr.gz".
 std::string shape_name(const std::filesystem::path& file);
 
-/// A shape as it was found.
+/// A shape as found.
 struct Shape {
   ShapeKind kind = ShapeKind::surface;
-  std::vector<std::string> repairs;  ///< surfaces: what was repaired, a sentence each
-  std::vector<std::string> remarks;  ///< surfaces: what of the file is not used, likewise
-  TriangleSurface repaired;          ///< the surface then; empty where the file is whole
-  Vec3 size = Vec3::Zero();          ///< of the box around it [file units]
+  std::vector<std::string> repairs;  ///< surfaces: repairs, a sentence each
+  std::vector<std::string> remarks;  ///< surfaces: parts of the file that are not used, a sentence each
+  TriangleSurface repaired;          ///< repaired surface; empty if the file needs no repair
+  Vec3 size = Vec3::Zero();          ///< size of its bounding box [file units]
   double boundary = 0.0;             ///< its area; of pictures its length [file units^2, file units]
-  bool remesh = true;                ///< surfaces: the edge length is to be that of the boundary too
+  bool remesh = true;                ///< surfaces: the edge length also applies to the boundary
   bool dark = false;                 ///< pictures: drawn dark on a light ground
-  double unit = 0.0;                 ///< images: that the file counts in [mm]; 0: it does not say
+  double unit = 0.0;                 ///< images: unit of the file's lengths [mm]; 0: not given
 };
 
-/// How a shape is taken.
+/// Options for reading a shape.
 struct ShapeOptions {
   SurfaceParts parts = SurfaceParts::most;
   bool strict = false;                ///< repair nothing
-  std::optional<ValueRange> range{};  ///< of an image that are body
-  std::optional<int> nodes{};         ///< on the surface of the mesh that is to come; of pictures the outline
+  std::optional<ValueRange> range{};  ///< values of an image that are body
+  std::optional<int> nodes{};         ///< number on the surface of the future mesh; for pictures on the
+                                      ///< outline
 
   [[nodiscard]] int nodes_of(ShapeKind kind) const noexcept {
     return nodes.value_or(kind == ShapeKind::picture ? 60 : 4000);
@@ -51,10 +52,11 @@ struct ShapeOptions {
 };
 
 /// Reads a surface and repairs it, or measures an image or a picture. The boundary of an image is that of the
-/// voxels that are not 0, whose staircase is taken for 3/2 of the smooth area, the mean over all directions
-/// of |n_x| + |n_y| + |n_z|, in millimetres where the file says its unit; that of a picture, of pixels, for
-/// 4/pi of the smooth length. A picture is dark on light where more than half of its rim would be body else.
-/// Throws Error for files that cannot be used; strict, also for surfaces that would need a repair.
+/// voxels that are not 0; its staircase area is taken as 3/2 of the smooth area (the mean of
+/// |n_x| + |n_y| + |n_z| over all directions), in millimetres if the file has a unit. The outline of a
+/// picture's pixels is taken as 4/pi of the smooth length. A picture is dark on light if otherwise more than
+/// half of its rim would be body. Throws Error for files that cannot be used; if strict, also for surfaces
+/// that need repair.
 Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options);
 
 }  // namespace palpate

@@ -28,7 +28,7 @@ using Complex =
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
-constexpr double distance_per_edge = 0.05;  // of the boundary, where facet_distance is not given
+constexpr double distance_per_edge = 0.05;  // for the boundary, if facet_distance is not given
 
 Polyhedron as_polyhedron(const TriangleSurface& surface) {
   Polyhedron polyhedron;

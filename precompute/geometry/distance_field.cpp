@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t lines_at_once = 16;  // of floats side by side: what the processor fetches at once
+constexpr std::size_t lines_at_once = 16;  // adjacent floats, a cache line
 
 /// Replaces f by min_q f(q) + (spacing (p - q))^2 along one line: the lower envelope of parabolas.
 class LineTransform {
@@ -21,12 +21,12 @@ class LineTransform {
         apex_(f_.size()),
         from_(f_.size() + 1) {}
 
-  /// Line of the given length.
+  /// Transforms a line of the given length.
   void operator()(float* line) {
     const std::size_t n = f_.size();
     std::copy_n(line, n, f_.begin());
     if (std::ranges::all_of(f_, [this](double f) { return f == f_[0]; })) {
-      return;  // as far everywhere, as most lines away from the body: they stay
+      return;  // equally far everywhere, as on most lines away from the body: they do not change
     }
     std::size_t last = 0;
     apex_[0] = 0;
@@ -51,7 +51,7 @@ class LineTransform {
   }
 
  private:
-  /// Where the parabola with apex b takes over from that with apex a < b.
+  /// Position where the parabola with apex b takes over from that with apex a < b.
   [[nodiscard]] double crossing(std::size_t a, std::size_t b) const {
     const auto x = static_cast<double>(a), y = static_cast<double>(b);
     return (f_[b] - f_[a] + spacing2_ * (y * y - x * x)) / (2.0 * spacing2_ * (y - x));
@@ -92,7 +92,7 @@ std::vector<float> distance_to(const VoxelGrid& grid, const std::vector<std::uin
   return d2;
 }
 
-/// Binomial filter (1/4, 1/2, 1/4) along each axis; the rim stays.
+/// Binomial filter (1/4, 1/2, 1/4) along each axis; the rim does not change.
 void smooth(const VoxelGrid& grid, std::vector<float>& values) {
   std::size_t stride = 1;
   for (const Index length : grid.size) {
@@ -144,12 +144,12 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
 }
 
 void DistanceField::grow_to(double voxels) {
-  // Eighths of voxels, in each of which the field is taken for linear.
+  // Eighths of voxels, in each of which the field is assumed linear.
   struct Eighth {
     double middle, width;  // of its values
   };
-  const double most = 2.0 * grid_.spacing.maxCoeff();  // that the boundary is moved by, as the field has it
-  const double reach = 2.0 * grid_.spacing.norm();     // that a field can change by within a voxel
+  const double most = 2.0 * grid_.spacing.maxCoeff();  // largest shift of the boundary
+  const double reach = 2.0 * grid_.spacing.norm();     // largest change of a field within a voxel
   double inside = 0.0;
   std::vector<Eighth> near;
   for (std::size_t v = 0; v < distance_.size(); ++v) {

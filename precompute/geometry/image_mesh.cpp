@@ -35,7 +35,7 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
-constexpr double relative_error = 1e-4;  // of the body's size: where boundary and interfaces are found
+constexpr double relative_error = 1e-4;  // relative to the body's size: for locating boundary and interfaces
 constexpr double seed_spacing = 1.5;     // [edge_length] largest between the first points on interfaces
 
 Vec3 as_vector(const Point& p) {
@@ -73,11 +73,11 @@ Domain make_domain(const VoxelGrid& grid, const LabelField& field) {
 
 void insert(Complex& complex, const Point& point, const Domain::Index& index) {
   const Complex::Vertex_handle vertex = complex.triangulation().insert(Triangulation::Point(point));
-  complex.set_dimension(vertex, 2);  // it is on a surface
+  complex.set_dimension(vertex, 2);  // on a surface
   complex.set_index(vertex, index);
 }
 
-/// Puts the first points on the boundary.
+/// Inserts the first points on the boundary.
 void seed_boundary(Complex& complex, const Domain& domain) {
   std::vector<std::pair<Point, Domain::Index>> seeds;
   domain.construct_initial_points_object()(std::back_inserter(seeds));
@@ -86,8 +86,8 @@ void seed_boundary(Complex& complex, const Domain& domain) {
   }
 }
 
-/// Puts points on the interfaces between labels: refinement by itself finds what is large compared with the
-/// elements, but not every vessel.
+/// Inserts points on the interfaces between labels: refinement alone finds those that are large compared with
+/// the elements, but not every vessel.
 void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& body, const LabelField& field,
                      double edge_length) {
   for (const auto& [from, to] : interface_crossings(body, field, seed_spacing * edge_length)) {
@@ -97,7 +97,7 @@ void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& bo
   }
 }
 
-/// Delaunay refinement of the surfaces, and unless it is `hollow` of the inside.
+/// Delaunay refinement of the surfaces and, unless `hollow`, of the inside.
 Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& field,
                const MeshOptions& options, bool hollow) {
   const double facet_distance =
@@ -122,7 +122,7 @@ Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& fi
   return complex;
 }
 
-/// Meshes with Mesh_3, `hollow` for the surfaces alone, in a child process.
+/// Meshes with Mesh_3 in a child process; `hollow`: the surfaces alone.
 Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions& options,
                const std::string& where, bool hollow) {
   const ChildTask task = {.name = "CGAL's mesher",
@@ -166,14 +166,14 @@ Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const Mesh
 
 constexpr double most_lost = 0.1;         // of the voxels
 constexpr double most_smoothed = 0.03;    // of the volume
-constexpr std::size_t told_part = 8;      // [voxels] of one that is lost
+constexpr std::size_t told_part = 8;      // [voxels] of a lost part that is reported
 constexpr double told_difference = 0.05;  // of the volume
 const char* const finer_voxels =
     "resample the segmentation to voxels a third as large, without interpolation (3D Slicer: Resample Scalar "
     "Volume, nearest neighbour; unu resample -k box -s x3 x3 x3), or make the part thicker there";
 
-/// Smoothing takes what is one voxel thick. Throws Error where that is much of the body, as no mesher finds
-/// the rest in any time; tells of less. Returns the voxels that remain.
+/// Reports parts that smoothing removes because they are one voxel thick. Throws Error if they are much of
+/// the body, as no mesher finds the rest in reasonable time. Returns the number of remaining voxels.
 double check_thickness(const VoxelBody& body, const LabelField& field, const std::string& where,
                        std::vector<std::string>& notes) {
   std::vector<std::uint8_t> lost(body.inside.size(), 0);
@@ -197,7 +197,7 @@ double check_thickness(const VoxelBody& body, const LabelField& field, const std
   return voxels - static_cast<double>(lost_voxels);
 }
 
-/// Tells where the mesh is not the image's body.
+/// Reports differences between the mesh and the image's body.
 void note_volume(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
   double voxels = 0.0, elements = 0.0;
   for (const std::uint8_t inside : body.inside) voxels += inside;
@@ -211,7 +211,7 @@ void note_volume(const Mesh& mesh, const VoxelBody& body, std::vector<std::strin
                     100.0 * std::abs(difference), difference < 0.0 ? "less" : "more", finer_voxels));
 }
 
-/// What became of each label.
+/// Reports each label's volume in the mesh and in the image.
 void report_volumes(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
   std::map<Index, std::array<double, 2>> volumes;
   for (const Index label : body.labels) {
@@ -235,7 +235,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
   const std::string where = image.file.string();
   const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
   LabelField field(body);
-  // Smoothing takes from whatever curves outward: of a ball nine voxels thick 10 %.
+  // Smoothing shrinks everything convex: a ball nine voxels thick by 10 %.
   field.grow_to((1.0 - most_smoothed) * check_thickness(body, field, where, notes));
   const bool by_tetgen = options.mesher == Mesher::tetgen;
   Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);

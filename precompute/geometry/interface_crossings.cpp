@@ -6,14 +6,14 @@
 namespace palpate {
 namespace {
 
-constexpr double least_slope = 0.25;  // of the depth on the way inwards
+constexpr double least_slope = 0.25;  // of the depth, inwards
 
-/// Points that keep a distance from each other.
+/// Points with a minimum distance from each other.
 class SparsePoints {
  public:
   explicit SparsePoints(double largest_distance) : cell_size_(largest_distance) {}
 
-  /// Takes x if no other one is nearer than `distance`.
+  /// Adds x unless another point is nearer than `distance`; returns true if added.
   bool add(const Vec3& x, double distance) {
     const Cell cell = cell_of(x);
     for (int n = 0; n < 27; ++n) {
@@ -38,8 +38,8 @@ class SparsePoints {
   std::map<Cell, std::vector<Vec3>> points_;
 };
 
-/// Half the thickness of a label at a voxel on its border: the depth that is reached by going to the deepest
-/// of the 26 neighbours as long as this leads inwards, at most `limit`. Needs an empty rim.
+/// Half the thickness of a label at a voxel on its border: the depth reached by moving to the deepest of the
+/// 26 neighbours as long as that leads inwards, at most `limit`. Needs an empty rim.
 double half_thickness(const VoxelBody& body, const LabelField& field, std::size_t voxel, double limit) {
   const LabelField::Place start = field(body.center(voxel));
   double depth = start.depth;

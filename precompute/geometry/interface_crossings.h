@@ -1,4 +1,4 @@
-// Where the labels of a body meet.
+// Points on the interfaces between labels of a body.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ struct Crossing {
 };
 
 /// Centres of neighbouring voxels of the body that have different labels in the image and in the field,
-/// spread over the interfaces: from each other they are as far as the thinner of the two labels is half thick
-/// there, at most `largest_distance` and at least a voxel. The body needs an empty rim, as crop leaves it.
+/// spread over the interfaces. Their distance is half the thickness of the thinner label there, at most
+/// `largest_distance` and at least a voxel. The body needs an empty rim, as made by crop.
 std::vector<Crossing> interface_crossings(const VoxelBody& body, const LabelField& field,
                                           double largest_distance);
 

@@ -24,7 +24,7 @@ bool is_rest(const MaterialPart& part) {
   return part.regions.empty() && !part.where;
 }
 
-/// "(0.1, 0.2, 0.3) m", in the plane "(0.1, 0.2) m".
+/// Text for the centre of an element: "(0.1, 0.2, 0.3) m", in the plane "(0.1, 0.2) m".
 std::string place(const Mesh& mesh, Index e) {
   const ElementNodes x = element_nodes(mesh, e);
   const Vec3 centre = x.topRows(traits(mesh.element).corners).colwise().mean().transpose();

@@ -1,4 +1,4 @@
-// Which material each element is made of.
+// Materials of elements.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-/// Number in `parts` of the material of each element. [E] Throws Error (where = `file` and the entry) where
-/// two parts claim an element, an element is left without material, or a part has no element.
+/// Number in `parts` of each element's material. [E] Throws Error (where = `file` and the entry) if two parts
+/// claim an element, an element has no material, or a part has no element.
 std::vector<Index> materials_of_elements(const Mesh& mesh, const std::vector<MaterialPart>& parts,
                                          const std::string& file);
 

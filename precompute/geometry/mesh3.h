@@ -1,4 +1,4 @@
-// What CGAL's Mesh_3 does with images and surfaces alike.
+// Steps of CGAL's Mesh_3 common to images and surfaces.
 #pragma once
 
 #include <CGAL/exude_mesh_3.h>
@@ -13,20 +13,21 @@
 
 namespace palpate::mesh3 {
 
-/// Bound on the surface triangles' angles that Mesh_3 can promise [degree].
+/// Largest bound on the surface triangles' angles that Mesh_3 guarantees to reach [degree].
 constexpr double facet_angle = 25.0;
-/// Sliver removal stops here [degree].
+/// Angle at which sliver removal stops [degree].
 constexpr double wanted_dihedral = 12.0;
-/// Bounds on circumradii; with these, measured on organs, the mean edge is the one asked for on the surface
-/// and, without grading, inside. A hollow mesh has no cells that make its facets smaller.
+/// Bounds on circumradii relative to the edge length. With them, as measured on organs, the mean edge is the
+/// requested one on the surface and, without grading, inside. A hollow mesh has no cells that make its facets
+/// smaller.
 constexpr double facet_size_per_edge = 1.2;
 constexpr double hollow_facet_size_per_edge = 0.77;
 constexpr double radius_per_edge = 0.73;
-/// Iterations of a global optimisation; most converge earlier.
+/// Largest number of iterations of a global optimisation; most converge earlier.
 constexpr int most_iterations = 50;
 
-/// Moves the nodes of a refined complex for better elements, as far as the options ask for it. CGAL's own
-/// limits on time would give another mesh every run: 0 is none.
+/// Moves the nodes of a refined complex for better elements, as requested in the options. CGAL's own time
+/// limits would make the mesh differ in every run: 0 means none.
 template <typename Complex, typename Domain>
 void optimise(Complex& complex, const Domain& domain, const MeshOptions& options) {
   namespace parameters = CGAL::parameters;
@@ -47,8 +48,8 @@ void optimise(Complex& complex, const Domain& domain, const MeshOptions& options
   }
 }
 
-/// The complex as a mesh: region_of(subdomain index) is the region of a cell, and the facets between
-/// different subdomains are the tagged ones (tag 0), in no particular sense.
+/// Mesh of a complex: region_of(subdomain index) is the region of a cell; facets between different subdomains
+/// are tagged (tag 0), in no particular sense.
 template <typename Complex, typename RegionOf>
 Mesh export_mesh(const Complex& complex, const RegionOf& region_of) {
   Mesh mesh;

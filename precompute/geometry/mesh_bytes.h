@@ -1,4 +1,4 @@
-// Meshes on their way from a child process.
+// Meshes sent by a child process.
 #pragma once
 
 #include "base/child_process.h"
@@ -9,7 +9,7 @@ namespace palpate {
 /// A mesh as bytes, for unpack_mesh.
 Bytes pack(const Mesh& mesh);
 
-/// The mesh that `pack` has made bytes of. Throws Error for bytes that are none.
+/// Mesh from bytes made by `pack`. Throws Error for other bytes.
 Mesh unpack_mesh(const Bytes& bytes);
 
 }  // namespace palpate

@@ -18,7 +18,7 @@ std::size_t at(Index i) {
   return static_cast<std::size_t>(i);
 }
 
-/// For each element, one that stands for its part: of the mesh, or of a region. [E]
+/// For each element, the element that represents its part of the mesh, or of its region. [E]
 std::vector<Index> find_parts(const Mesh& mesh, bool of_regions) {
   std::vector<Index> parent(at(mesh.elements()));
   std::iota(parent.begin(), parent.end(), 0);
@@ -46,7 +46,7 @@ std::vector<Index> find_parts(const Mesh& mesh, bool of_regions) {
 
 std::vector<RegionPoint> region_points(const Mesh& mesh) {
   const std::vector<Index> parts = find_parts(mesh, true);
-  std::map<Index, std::pair<double, Index>> largest;  // of each part: volume and element
+  std::map<Index, std::pair<double, Index>> largest;  // for each part: volume and element
   for (Index e = 0; e < mesh.elements(); ++e) {
     auto& best = largest[parts[at(e)]];
     best = std::max(best, {std::abs(element_volume(mesh.element, element_nodes(mesh, e))), e});

@@ -14,24 +14,24 @@ namespace {
 
 constexpr double most_elements = 5e7;  // against mistakes of scale
 
-// Estimates meant to be far above what a mesher takes, not measurements. What it makes beyond the expected is
-// at small details of the boundary, of which there are no more than facets.
+// Estimates meant to be far above the needs of a mesher, not measurements. Elements beyond the expected ones
+// are at small details of the boundary, of which there are no more than facets.
 constexpr double elements_per_facet = 10.0;
 constexpr std::chrono::seconds least_time{5};
 constexpr double time_per_element = 2e-3;  // [s]
-constexpr double optimisation = 20.0;      // times as long with odt or lloyd
+constexpr double optimisation = 20.0;      // factor on the time with odt or lloyd
 constexpr std::int64_t least_memory = 512LL << 20;
 constexpr double memory_per_element = 4e3;  // [byte]
 
-// What a bake takes at least for an element until its plan is known [byte]: below what --dry-run took beyond
-// 50 MB for a box of 24^3 cells (tet4 209, hex8 2974), one of 14^3 (tet10 5100) and a rectangle of 200^2
-// (tri3 164, quad4 514).
+// Least memory of a bake per element until its plan is known [byte]: below the measured use of --dry-run
+// beyond 50 MB for a box of 24^3 cells (tet4 209, hex8 2974), one of 14^3 (tet10 5100) and a rectangle of
+// 200^2 (tri3 164, quad4 514).
 constexpr double bytes_per_tet4 = 200.0;
 constexpr double bytes_per_tet10 = 4000.0;
 constexpr double bytes_per_hex8 = 2500.0;
 constexpr double bytes_per_plane_element = 150.0;
 
-/// Area of the faces between voxels that are not alike, and their number.
+/// Area and number of the faces between voxels of different values.
 template <typename Value>
 std::array<double, 2> walls(const VoxelBody& body, const std::vector<Value>& values) {
   const std::array<double, 3> face = {body.spacing[1] * body.spacing[2], body.spacing[2] * body.spacing[0],

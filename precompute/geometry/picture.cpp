@@ -57,9 +57,9 @@ std::vector<Run> runs_of(const std::vector<LatticePoint>& outline) {
   return runs;
 }
 
-/// A line that turns the staircases of an outline into slanted lines: through the middle of each step, half a
-/// pixel inside the ends of the runs at its extremes, and through the corners that are meant: those between
-/// long runs or without steps beside them.
+/// Replaces the staircases of an outline by slanted lines: through the middle of each step, half a pixel
+/// inside the ends of the runs at its extremes, and through real corners: those between long runs or without
+/// steps beside them.
 std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
   const std::vector<Run> runs = runs_of(outline);
   const auto run_at = [&](std::size_t r) -> const Run& { return runs[r % runs.size()]; };
@@ -83,7 +83,7 @@ std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
   return line;
 }
 
-/// Closed lines, simplified together so that they do not cross: no point of theirs is further away than this.
+/// Closed lines, simplified together so that they do not cross and no point moves further than `tolerance`.
 PolygonGeometry simplified(const std::vector<std::vector<Point>>& lines, double tolerance) {
   Triangulation triangulation;
   std::vector<Triangulation::Constraint_id> ids;
@@ -97,7 +97,7 @@ PolygonGeometry simplified(const std::vector<std::vector<Point>>& lines, double 
     for (const auto vertex : triangulation.vertices_in_constraint(id)) {
       points.emplace_back(vertex->point().x(), vertex->point().y(), 0.0);
     }
-    points.pop_back();  // the first again
+    points.pop_back();  // repeats the first
   }
   return polygon;
 }
@@ -112,8 +112,8 @@ double signed_area(const Points& points) {
   return twice / 2.0;
 }
 
-/// The lines around the body, as simple as the edges of the mesh allow and the area that they enclose:
-/// strokes thinner than an edge lose their ends, and half of their width, within what an edge does not see.
+/// Outlines of the body, as simple as the mesh's edge length and the enclosed area allow: strokes thinner
+/// than an edge lose their ends, and half of their width, within what an edge cannot resolve.
 PolygonGeometry outline(const PixelBody& body, double edge_length) {
   std::vector<std::vector<Point>> lines;
   double area = 0.0;

@@ -18,7 +18,7 @@ namespace palpate {
 namespace {
 
 constexpr std::uint64_t max_pixels = 100'000'000;
-constexpr double bytes_per_pixel = 16.0;  // of memory, until the outlines are traced
+constexpr double bytes_per_pixel = 16.0;  // of memory until the outlines are traced
 constexpr unsigned char first_white = 128;
 constexpr std::string_view png_signature = "\x89PNG\r\n\x1a\n";
 const char* const save_again = "save the picture again as PNG, or as PBM (P1, P4)";
@@ -37,14 +37,14 @@ void check_pixels(std::uint64_t width, std::uint64_t height, const std::string& 
              fmt::format("a picture of {} x {} pixels", width, height), where, "scale it down");
 }
 
-/// An all-empty body.
+/// A body without pixels inside.
 PixelBody blank(std::uint64_t width, std::uint64_t height) {
   PixelBody body{static_cast<Index>(width), static_cast<Index>(height), {}};
   body.inside.resize(width * height);
   return body;
 }
 
-/// libpng's picture, freed when it goes.
+/// libpng's picture, freed by the destructor.
 struct PngImage {
   png_image image{};
 
@@ -54,7 +54,7 @@ struct PngImage {
   ~PngImage() { png_image_free(&image); }
 };
 
-/// Transparent pixels lie over what is no body.
+/// Reads a PNG; transparent pixels lie over background.
 PixelBody read_png(const std::string& bytes, bool dark, const std::string& where) {
   PngImage png;
   const auto check = [&](int is_good) {
@@ -74,15 +74,15 @@ PixelBody read_png(const std::string& bytes, bool dark, const std::string& where
   return body;
 }
 
-/// The number that stands in a PNG as its four bytes from `at` on.
+/// Number in the four bytes of a PNG from `at` on.
 std::uint32_t png_number(const std::string& bytes, std::size_t at) {
   std::uint32_t number = 0;
   for (const char byte : bytes.substr(at, 4)) number = number << 8 | static_cast<unsigned char>(byte);
   return number;
 }
 
-/// Reads a PNG in a child, as libpng is foreign code. Its size is looked at before: a child is not told how
-/// much memory there is.
+/// Reads a PNG in a child, as libpng is third-party code. Its size is checked before, since the child cannot
+/// see the available memory.
 PixelBody read_png_in_child(const std::string& bytes, bool dark, const std::string& where) {
   constexpr std::size_t width_at = 16, height_at = 20, header_ends = 24;  // libpng refuses less
   if (bytes.size() >= header_ends)
@@ -110,7 +110,7 @@ PixelBody read_png_in_child(const std::string& bytes, bool dark, const std::stri
   return body;
 }
 
-/// Reads a PBM file from its front.
+/// Reader of a PBM file from its front.
 class PbmReader {
  public:
   PbmReader(std::string_view text, const std::string& where) : text_(text), where_(where) {
@@ -155,7 +155,7 @@ class PbmReader {
   }
 
  private:
-  /// Blanks, and comments from # to the end of their line.
+  /// Skips blanks, and comments from # to the end of their line.
   void skip_blanks() {
     while (!text_.empty() && (std::string_view(" \t\r\n\v\f#").find(text_[0]) != std::string_view::npos)) {
       const std::size_t end = text_[0] == '#' ? std::min(text_.find('\n'), text_.size() - 1) : 0;
@@ -198,7 +198,7 @@ class PbmReader {
   const std::string& where_;
 };
 
-/// The body of a PBM, which is the paper, or the ink where that is meant.
+/// The body of a PBM: the paper or, if `dark`, the ink.
 PixelBody with_ground(PixelBody body, bool dark) {
   if (dark)
     for (std::uint8_t& pixel : body.inside) pixel = pixel == 0 ? 1 : 0;

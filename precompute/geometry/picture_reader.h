@@ -6,10 +6,10 @@
 
 namespace palpate {
 
-/// Reads a picture; what is not black is body, or what is, where it is said to be dark. PNG: a pixel is black
-/// when its grey value (0 to 255; colours by their luminance, transparent ones over what is no body) is below
-/// 128. PBM (plain P1, raw P4): where the bit is 1. The file's first bytes tell which it is. Throws Error for
-/// a file that is neither, damaged, or too large.
+/// Reads a picture. The body is the pixels that are not black or, if marked `dark`, the black ones. PNG: a
+/// pixel is black if its grey value (0 to 255; colours by luminance, transparent pixels over background) is
+/// below 128. PBM (plain P1, raw P4): if its bit is 1. The file's first bytes determine the format. Throws
+/// Error for a file that is neither, damaged, or too large.
 PixelBody read_picture(const PictureGeometry& picture);
 
 }  // namespace palpate

@@ -11,20 +11,20 @@ namespace palpate {
 namespace {
 
 constexpr double small_part = 0.01;        // of the largest part
-constexpr std::size_t largest_filled = 4;  // pixels; larger holes may be meant
+constexpr std::size_t largest_filled = 4;  // pixels; larger holes may be intended
 constexpr std::size_t listed_bodies = 5;
 
 using Pixel = std::array<Index, 2>;
 
-/// A group of pixels that are connected through sides and are all body or all not.
+/// A group of pixels connected through sides that are all body or all background.
 struct Part {
   bool is_body = false;
   bool is_at_rim = false;
   std::size_t pixels = 0;
-  Pixel first{};  ///< one of them
+  Pixel first{};  ///< one of its pixels
 };
 
-/// Numbers the pixels that are connected with `first`.
+/// Numbers the pixels connected with `first`.
 Part fill_part(const PixelBody& body, const Pixel& first, Index number, std::vector<Index>& part_of) {
   Part part{body.is_body(first[0], first[1]), false, 0, first};
   part_of[body.at(first[0], first[1])] = number;
@@ -48,7 +48,7 @@ Part fill_part(const PixelBody& body, const Pixel& first, Index number, std::vec
   return part;
 }
 
-/// Numbers the parts; `part_of` gets each pixel's.
+/// Numbers the parts; `part_of` gets the part of each pixel.
 std::vector<Part> find_parts(const PixelBody& body, std::vector<Index>& part_of) {
   std::vector<Part> parts;
   part_of.assign(body.inside.size(), -1);
@@ -61,12 +61,12 @@ std::vector<Part> find_parts(const PixelBody& body, std::vector<Index>& part_of)
   return parts;
 }
 
-/// As picture viewers count.
+/// Position of a pixel as picture viewers count.
 std::string shown(const PixelBody& body, const Pixel& pixel) {
   return fmt::format("column {}, row {}", pixel[0], body.height - 1 - pixel[1]);
 }
 
-/// Turns the pixels of some parts from body to not-body or back; returns how many.
+/// Switches the pixels of some parts between body and background; returns how many.
 std::size_t turn(PixelBody& body, const std::vector<Index>& part_of, const std::vector<bool>& turned) {
   std::size_t count = 0;
   for (std::size_t p = 0; p < body.inside.size(); ++p) {
@@ -78,7 +78,7 @@ std::size_t turn(PixelBody& body, const std::vector<Index>& part_of, const std::
   return count;
 }
 
-/// Whether, of the four pixels from (i, j) on, the two of body face each other across the corner.
+/// True if, of the four pixels from (i, j) on, exactly the two on a diagonal are body.
 bool touches_at_corner(const PixelBody& body, Index i, Index j) {
   const bool here = body.is_body(i, j), right = body.is_body(i + 1, j);
   return here != right && here == body.is_body(i + 1, j + 1) && right == body.is_body(i, j + 1);
@@ -94,7 +94,7 @@ void for_each_square(const PixelBody& body, const Visit& visit) {
   }
 }
 
-/// Throws Error for several bodies; touching ones are told first.
+/// Throws Error for several bodies; touching ones are reported first.
 [[noreturn]] void refuse_bodies(const PixelBody& body, const std::vector<Index>& part_of,
                                 const std::vector<Part>& bodies, const std::string& where) {
   for_each_square(body, [&](Index i, Index j) {
@@ -144,7 +144,7 @@ void drop_small_parts(PixelBody& body, const std::string& where, std::vector<std
   }
 }
 
-/// Fills one of the two empty pixels wherever the body touches itself at a corner.
+/// Fills one of the two empty pixels wherever the body touches itself at a corner only.
 void join_across_corners(PixelBody& body, std::vector<std::string>& notes) {
   std::size_t filled = 0;
   for (std::size_t before = 1; before != filled;) {  // a filled pixel may touch another one
@@ -183,8 +183,8 @@ std::size_t corner_at(const PixelBody& body, const LatticePoint& p) {
          static_cast<std::size_t>(body.width + 1) * static_cast<std::size_t>(p[1]);
 }
 
-/// The step (0 to 3: right, up, left, down) that leaves each corner of pixels with the body on its left: one
-/// at most, as no corner touches another.
+/// Direction (0 to 3: right, up, left, down) of the outline that leaves each corner of pixels with the body
+/// on its left: at most one, as no corner touches another.
 std::vector<std::uint8_t> steps_along_outlines(const PixelBody& body) {
   std::vector<std::uint8_t> onward(corner_at(body, {0, body.height + 1}), no_step);
   for (Index j = 0; j < body.height; ++j) {
@@ -219,7 +219,7 @@ std::vector<std::vector<LatticePoint>> trace_outlines(const PixelBody& body) {
   constexpr std::array<LatticePoint, 4> step = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
   std::vector<std::uint8_t> onward = steps_along_outlines(body);
   const auto next = [&](const LatticePoint& p) -> std::uint8_t& { return onward[corner_at(body, p)]; };
-  std::vector<std::vector<LatticePoint>> lines;  // the outer one holds the lowest point, so it comes first
+  std::vector<std::vector<LatticePoint>> lines;  // the outer one has the lowest point, so it comes first
   for (Index y = 0; y <= body.height; ++y) {
     for (Index x = 0; x <= body.width; ++x) {
       if (next({x, y}) == no_step) {

@@ -32,8 +32,8 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_2;
 
-/// Vertex with a number. CGAL orders handles by it where it would compare addresses, by which Lloyd's moves
-/// came in another order in every run.
+/// Vertex with a number, by which CGAL orders handles; it would otherwise compare addresses, and Lloyd's
+/// moves came in another order in every run.
 template <typename Base = CGAL::Delaunay_mesh_vertex_base_2<Kernel>>
 class NumberedVertex : public Base {
  public:
@@ -61,16 +61,16 @@ using Line = std::vector<Point>;  // closed
 
 constexpr std::size_t max_nodes = 2'000'000;
 constexpr double elements_per_node = 2.0;
-constexpr double unsure_of_grading = 3.0;  // the estimate is that of a strip
+constexpr double unsure_of_grading = 3.0;  // the estimate is for a strip
 constexpr double time_per_node = 1e-3;     // [s] meant to be far too much, smoothing included
 constexpr double memory_per_node = 4e3;    // [byte]
 constexpr double wanted_angle = 20.0;      // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
-constexpr double radius_per_edge = 0.73;   // measured: the mean edge is then the one asked for
+constexpr double radius_per_edge = 0.73;   // measured: the mean edge is then the requested one
 constexpr int lloyd_iterations = 20;       // with many more, graded meshes drift away from their sizes
 
 enum MeshStatus : int { meshed = 0, no_mesh = 1, too_many_nodes = 2 };
 
-/// Throws Error; `nodes` is 0 where their number is not known.
+/// Throws Error for too many elements; `nodes` is 0 if their number is unknown.
 [[noreturn]] void throw_too_many(double nodes, const std::string& where) {
   throw Error(
       (nodes == 0.0 ? "the mesh would have" : "the mesh would have " + shown_count(nodes) + " nodes,") +
@@ -78,7 +78,7 @@ enum MeshStatus : int { meshed = 0, no_mesh = 1, too_many_nodes = 2 };
       where, "use a larger edge_length in [mesh], or check scale in [geometry]");
 }
 
-/// Edge length wanted at a place: that at the lines, growing with the distance from them.
+/// Target edge length at a place: that at the lines, growing with the distance from them.
 class EdgeTarget {
  public:
   EdgeTarget(const std::vector<Line>& lines, double edge_length, double grading)
@@ -100,7 +100,7 @@ class EdgeTarget {
   }
 
  private:
-  using Segments = std::vector<Kernel::Segment_3>;  // CGAL 5's trees are of space
+  using Segments = std::vector<Kernel::Segment_3>;  // CGAL 5's trees are three-dimensional
   double edge_length_;
   double grading_;
   Segments segments_;
@@ -108,8 +108,8 @@ class EdgeTarget {
       tree_;
 };
 
-/// Which triangles are refined (CGAL's MeshingCriteria_2): those too large for their place, largest first;
-/// then those with an angle below the bound, sharpest first.
+/// Criteria for refining triangles (CGAL's MeshingCriteria_2): first those too large for their place, largest
+/// first; then those with an angle below the bound, sharpest first.
 class Criteria {
  public:
   struct Quality {
@@ -160,7 +160,7 @@ class Criteria {
   const EdgeTarget* target_;
 };
 
-/// The outer line, then the holes; the body is on the left of each.
+/// The outer line, then the holes, with the body on the left of each.
 std::vector<Line> lines_around(const PolygonGeometry& polygon) {
   const auto turned = [](const std::vector<Vec3>& points, CGAL::Orientation sense) {
     Line line;
@@ -179,7 +179,7 @@ std::vector<Line> lines_around(const PolygonGeometry& polygon) {
   return lines;
 }
 
-/// Tells of corners of the body that no mesh can do without.
+/// Reports corners of the body that are sharper than the wanted angle, which no mesh can avoid.
 void note_sharp_corners(const std::vector<Line>& lines, std::vector<std::string>& notes) {
   double sharpest = wanted_angle;  // [degree]
   Point place;
@@ -209,7 +209,7 @@ void note_sharp_corners(const std::vector<Line>& lines, std::vector<std::string>
   }
 }
 
-/// The lines with each edge in equal parts of about edge_length.
+/// Lines with each edge divided into equal parts of about edge_length.
 std::vector<Line> divided(const std::vector<Line>& lines, double edge_length, const std::string& where) {
   const auto parts_of = [&](const Kernel::Vector_2& edge) {
     return std::max(1.0, std::round(std::sqrt(edge.squared_length()) / edge_length));
@@ -233,7 +233,7 @@ std::vector<Line> divided(const std::vector<Line>& lines, double edge_length, co
   return result;
 }
 
-/// Inserts the lines as constraints and returns a point of the body: the centroid of the largest triangle at
+/// Inserts the lines as constraints and returns a point in the body: the centroid of the largest triangle at
 /// the outer line.
 Point insert_lines(const std::vector<Line>& lines, Triangulation& triangulation) {
   std::vector<std::vector<VertexHandle>> vertices;
@@ -264,7 +264,7 @@ Point insert_lines(const std::vector<Line>& lines, Triangulation& triangulation)
   return CGAL::centroid(largest);
 }
 
-/// Returns false when there would be more than max_nodes.
+/// Refines the triangles. Returns false if there would be more than max_nodes.
 bool refine(const EdgeTarget& target, const Point& seed, Triangulation& triangulation) {
   CGAL::Delaunay_mesher_2<Triangulation, Criteria> mesher(triangulation, Criteria(target));
   mesher.set_seeds(&seed, &seed + 1, true);
@@ -315,7 +315,7 @@ ChildResult make_mesh(const std::vector<Line>& lines, const MeshOptions& options
     if (options.lloyd) {
       smooth(seed, triangulation);
       const EdgeTarget any_length({}, std::numeric_limits<double>::infinity(), 0.0);
-      refine(any_length, seed, triangulation);  // where smoothing made angles too sharp
+      refine(any_length, seed, triangulation);  // for angles that smoothing made too sharp
     }
     return {meshed, pack(export_mesh(triangulation))};
   } catch (const CGAL::Failure_exception&) {
@@ -323,8 +323,8 @@ ChildResult make_mesh(const std::vector<Line>& lines, const MeshOptions& options
   }
 }
 
-/// Limits for as many nodes as the lines and the area inside them ask for; refinement stops at max_nodes.
-/// Throws Error (where = `where`) where they ask for many more.
+/// Limits for the number of nodes that the lines and the area inside imply; refinement stops at max_nodes.
+/// Throws Error (where = `where`) if they imply many more.
 ChildLimits refinement_limits(const std::vector<Line>& lines, const MeshOptions& options,
                               const std::string& where) {
   double area = 0.0, length = 0.0, given = 0.0;

@@ -36,7 +36,7 @@ std::string shown(const Kernel::Segment_2& s) {
   return "from " + shown(s.source()) + " to " + shown(s.target());
 }
 
-/// Line 0 is the outer one.
+/// Name of a line; line 0 is the outer one.
 std::string name_of(std::size_t line) {
   return line == 0 ? "the outer line" : "hole " + std::to_string(line);
 }
@@ -75,7 +75,7 @@ void check_points(const Line& points, const std::string& name, const std::string
   }
 }
 
-/// Whether two edges share more than the end where one follows the other.
+/// True if two edges have more in common than the end where one follows the other.
 bool collide(const Edge& a, const Edge& b, std::size_t points_of_line) {
   if (!CGAL::do_intersect(a.segment, b.segment)) {
     return false;
@@ -92,7 +92,7 @@ bool collide(const Edge& a, const Edge& b, std::size_t points_of_line) {
   return true;
 }
 
-/// The first pair of edges, in the order of the input, that collide.
+/// First pair of edges, in the order of the input, that collide.
 std::optional<std::pair<const Edge*, const Edge*>> find_collision(const std::vector<Edge>& edges,
                                                                   const std::vector<Line>& lines) {
   using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 2, const Edge*>;
@@ -111,7 +111,7 @@ std::optional<std::pair<const Edge*, const Edge*>> find_collision(const std::vec
   return first;
 }
 
-/// A point that two edges have in common.
+/// A point common to two edges.
 Point common_point(const Kernel::Segment_2& a, const Kernel::Segment_2& b) {
   Point point;
   if (CGAL::assign(point, CGAL::Object(CGAL::intersection(a, b)))) return point;
@@ -140,7 +140,7 @@ bool is_within(const Point& p, const Line& line) {
   return CGAL::bounded_side_2(line.begin(), line.end(), p) == CGAL::ON_BOUNDED_SIDE;
 }
 
-/// Needs lines that do not cross: then one point tells for all.
+/// Checks that holes lie side by side. Requires lines that do not cross, so that one point decides.
 void check_holes(const std::vector<Line>& lines, const std::string& where) {
   for (std::size_t hole = 1; hole < lines.size(); ++hole) {
     if (!is_within(lines[hole][0], lines[0])) {

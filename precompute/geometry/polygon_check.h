@@ -1,4 +1,4 @@
-// What must hold of a polygon before it is meshed.
+// Checks of a polygon before it is meshed.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace palpate {
 
-/// Throws Error (where = `where`) unless every line has three different points or more, no two edges cross,
-/// touch or overlap, and the holes lie side by side within the outer line. The message has the coordinates
-/// in the polygon's own unit.
+/// Throws Error (where = `where`) unless every line has at least three different points, no two edges cross,
+/// touch or overlap, and the holes lie side by side within the outer line. The message has coordinates in the
+/// polygon's own unit.
 void check_polygon(const PolygonGeometry& polygon, const std::string& where);
 
 }  // namespace palpate

@@ -14,8 +14,8 @@
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/surfaces/shells.h"
 
-/// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
-/// it again, so that every error becomes a crash.
+/// Replaces TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees it again,
+/// so that every error becomes a crash.
 [[noreturn, gnu::visibility("default")]] void stop_tetgen(tetgenmesh* mesh, int code) __asm__(
     "_Z15terminatetetgenP10tetgenmeshi");
 void stop_tetgen(tetgenmesh* /*mesh*/, int code) {
@@ -25,10 +25,10 @@ void stop_tetgen(tetgenmesh* /*mesh*/, int code) {
 namespace palpate {
 namespace {
 
-/// What TetGen's callback looks at; it has no user argument. Set in the child only.
+/// Data of TetGen's callback, which has no user argument. Set in the child only.
 const std::function<double(const Vec3&)>* target_edge = nullptr;
 
-/// Says that a tetrahedron is larger than the regular one of the target edge length at its centroid.
+/// True if a tetrahedron is larger than the regular one of the target edge length at its centroid.
 bool too_large(REAL* a, REAL* b, REAL* c, REAL* d, REAL* /*unused*/, REAL /*unused*/) {
   const Eigen::Map<const Vec3> xa(a), xb(b), xc(c), xd(d);
   const double volume = std::abs((xb - xa).cross(xc - xa).dot(xd - xa)) / 6.0;
@@ -66,7 +66,7 @@ void copy_regions(const std::vector<RegionPoint>& points, tetgenio& io) {
   }
 }
 
-/// TetGen empties what it can reach from a hole's point.
+/// Sets the holes: TetGen empties everything that it can reach from a hole's point.
 void copy_holes(const TriangleSurface& surface, tetgenio& io) {
   const std::vector<TriangleSurface> cavities = cavities_of(surface);
   io.numberofholes = static_cast<int>(cavities.size());
@@ -87,7 +87,7 @@ Mesh copy_mesh(const tetgenio& io, const std::vector<RegionPoint>& points) {
   for (int i = 0; i < io.numberoftetrahedra; ++i) {
     const Index region = points.empty() ? 0 : static_cast<Index>(io.tetrahedronattributelist[i]);
     if (!points.empty() && !wanted.contains(region)) {
-      continue;  // TetGen numbers the parts without a point beyond the points' regions
+      continue;  // TetGen gives parts without a point numbers beyond the points' regions
     }
     const int* corners = io.tetrahedronlist + std::ptrdiff_t{4} * i;
     mesh.connectivity.insert(mesh.connectivity.end(), corners, corners + 4);
@@ -97,7 +97,7 @@ Mesh copy_mesh(const tetgenio& io, const std::vector<RegionPoint>& points) {
   return mesh;
 }
 
-/// Status 0: the mesh. Otherwise TetGen's error code.
+/// Runs TetGen. Status 0: the mesh; otherwise TetGen's error code.
 ChildResult tetrahedralise(const TriangleSurface& surface, const std::vector<RegionPoint>& points,
                            const MeshOptions& options, const std::function<double(const Vec3&)>& edge_at) {
   tetgenio in, out;

@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// Which axis of the image runs along each of space, and whether backwards.
+/// Axis of the image along each axis of space, and whether it is reversed.
 struct Axes {
   std::array<std::size_t, 3> from{};
   std::array<bool, 3> backwards{};
@@ -40,8 +40,8 @@ double degrees(double cosine) {
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
-/// Axes at right angles in place of those of the image, by Gram and Schmidt: those of longer steps are turned
-/// onto the finer ones. Volumes stay as they are.
+/// Axes at right angles in place of those of the image, by Gram and Schmidt: axes with longer steps are
+/// rotated relative to the finer ones. Volumes are preserved.
 Eigen::Matrix3d straightened(const Eigen::Matrix3d& columns) {
   std::array<int, 3> order = {0, 1, 2};
   std::ranges::stable_sort(order, {}, [&](int axis) { return columns.col(axis).norm(); });
@@ -55,7 +55,7 @@ Eigen::Matrix3d straightened(const Eigen::Matrix3d& columns) {
   return straight;
 }
 
-/// Largest angle by which two of the axes miss a right one [degrees].
+/// Largest deviation of two axes from a right angle [degrees].
 double skew(const Eigen::Matrix3d& columns) {
   double most = 0.0;
   for (int a = 0; a < 3; ++a) {
@@ -99,7 +99,7 @@ ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Label
     corner += static_cast<double>(count - 1) * given.col(static_cast<Eigen::Index>(from));
   }
   if (is_sheared) {
-    header.turned = 0.0;  // it is where it is
+    header.turned = 0.0;  // its position is exact
     header.sheared = skew(given);
     Eigen::Matrix3d::Map(header.shear.data()) = given * directions.inverse() * turn;
   }

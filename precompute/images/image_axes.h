@@ -1,4 +1,4 @@
-// Images that lie in space with their axes in any order.
+// Images in space with axes in any order.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,17 +12,17 @@
 
 namespace palpate {
 
-/// Where an image is.
+/// Position of an image in space.
 struct ImagePlace {
-  /// From a voxel's three numbers, and 1, to its centre: x to the patient's right, y to the front, z to the
+  /// Maps a voxel's three numbers, and 1, to its centre: x to the patient's right, y to the front, z to the
   /// head.
   Eigen::Matrix<double, 3, 4> to_space = Eigen::Matrix<double, 3, 4>::Identity();
-  double unit = 0.0;  ///< of lengths there [mm]; 0: the file does not say, which is taken for millimetres
+  double unit = 0.0;  ///< unit of lengths there [mm]; 0: not given in the file, assumed to be millimetres
 };
 
-/// The image along the axes of space: its own are exchanged and turned round so that they come as near to
-/// those as they can; in mm. Where they are not at right angles, as with a tilted gantry, the grid has right
-/// ones and its header how the body is sheared. `labels` has `size` voxels, the first axis running fastest.
+/// The image along the axes of space, in mm: its own axes are permuted and reversed to be as near to those as
+/// possible. If they are not at right angles, as with a tilted gantry, those of the grid are, and its header
+/// has the shear of the body. `labels` has `size` voxels, the first axis fastest.
 ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// A labelled image as the child that reads it sends it.
+// A labelled image as sent by the child that reads it.
 #pragma once
 
 #include <algorithm>
@@ -22,12 +22,12 @@ struct ImageHeader {
   std::array<double, 3> spacing{};
   std::array<double, 3> origin{};
   double turned = 0.0;   ///< largest angle between an axis of the image and the nearest of space [degrees]
-  double sheared = 0.0;  ///< largest angle by which two axes miss a right one [degrees]; 0: no `shear`
-  /// Turns positions about the origin into those of the body in space; column-major.
+  double sheared = 0.0;  ///< largest deviation of two axes from a right angle [degrees]; 0: no `shear`
+  /// Matrix from positions about the origin to those of the body in space; column-major.
   std::array<double, 9> shear = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  double unit = 0.0;                   ///< that the file counts in [mm]; 0: it does not say
+  double unit = 0.0;                   ///< unit of the file's lengths [mm]; 0: not given
   double lowest = 0.0, highest = 0.0;  ///< of the values
-  bool whole = true;                   ///< all of them are whole numbers
+  bool whole = true;                   ///< all values are whole numbers
 };
 
 /// Voxels as labels.
@@ -37,7 +37,7 @@ struct Labels {
   bool whole = true;                                                           ///< all are whole numbers
 };
 
-/// The values rounded, what is not a number as 0; with a range 1 for those in it, 0 for the others.
+/// Labels from rounded values, NaN as 0; with a range 1 for values in it, 0 for others.
 template <class ValueAt>
 Labels labels_from(std::size_t voxels, const std::optional<ValueRange>& range, const ValueAt& value_at) {
   constexpr double most = 2147483647.0, unnoticed = 1e-3;  // slopes of headers are no exact numbers
@@ -56,7 +56,7 @@ Labels labels_from(std::size_t voxels, const std::optional<ValueRange>& range, c
   return labels;
 }
 
-/// Labels with x running fastest, after their header.
+/// Bytes of the header, followed by the labels with x fastest.
 inline ChildResult image_labels(ImageHeader header, const Labels& labels) {
   header.lowest = labels.lowest;
   header.highest = labels.highest;

@@ -23,7 +23,7 @@ constexpr std::string_view header_end = "##}";
 constexpr std::size_t largest_header = 65'536;
 const char* const complete_inr = "use a complete INR file (.inr, .inr.gz) with one label a voxel";
 
-/// What stands behind "NAME=" in the last line that begins so.
+/// Text after "NAME=" in the last line that begins so.
 std::optional<std::string_view> field(std::string_view header, std::string_view name) {
   std::optional<std::string_view> value;
   for (std::size_t at = header.find('\n'); at != std::string_view::npos; at = header.find('\n', at + 1)) {
@@ -36,7 +36,7 @@ std::optional<std::string_view> field(std::string_view header, std::string_view 
   return value;
 }
 
-/// A whole number from 1; `fallback` where the header lacks the field.
+/// A whole number from 1; `fallback` if the header lacks the field.
 std::int64_t whole(std::string_view header, std::string_view name, std::int64_t fallback,
                    const std::string& where) {
   const std::optional<std::string_view> given = field(header, name);
@@ -51,7 +51,7 @@ std::int64_t whole(std::string_view header, std::string_view name, std::int64_t 
   return value;
 }
 
-/// A number; not a number where it is none.
+/// A number; NaN if the text is none.
 double real(std::string_view header, std::string_view name, double fallback) {
   const std::optional<std::string_view> given = field(header, name);
   double value = fallback;
@@ -61,7 +61,7 @@ double real(std::string_view header, std::string_view name, double fallback) {
 }
 
 struct InrHeader {
-  std::array<std::int64_t, 4> size{};  // along x, y, z, and values a voxel
+  std::array<std::int64_t, 4> size{};  // along x, y, z, and values per voxel
   std::array<double, 3> spacing{}, origin{};
   std::int64_t bits = 0;  // of a value
   bool is_float = false, is_signed = false, is_big_endian = false;
@@ -73,7 +73,7 @@ struct InrHeader {
   }
 };
 
-/// The kind of number and the byte order; false where they are not said, or unknown.
+/// Reads the kind of number and the byte order; false if they are missing or unknown.
 bool read_kind(std::string_view text, InrHeader& header) {
   const std::string_view type = field(text, "TYPE").value_or(""), order = field(text, "CPU").value_or("");
   const auto is = [](std::string_view value, auto... names) { return (value.starts_with(names) || ...); };
@@ -87,7 +87,7 @@ bool read_kind(std::string_view text, InrHeader& header) {
          (header.is_big_endian || is(order, "decm", "alpha", "pc"));
 }
 
-/// Nothing where the file has no INR header, or one of a kind that is not known.
+/// Reads the header; nullopt if the file has no INR header, or one of an unknown kind.
 std::optional<InrHeader> read_header(gzFile_s* stream, const std::string& where) {
   std::string text(largest_header, '\0');
   text.resize(read_unpacked(stream, text));

@@ -25,17 +25,17 @@ namespace {
 
 constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels of 0.1 mm have 50
 constexpr double voxels_per_edge = 20.0;
-constexpr double least_turn = 0.1;  // of the image's axes that is told [degrees]
+constexpr double least_turn = 0.1;  // of the image's axes that is reported [degrees]
 const char* const complete_file =
     "use a complete INR, NIfTI or NRRD file (.inr, .inr.gz, .nii, .nii.gz, .nrrd) with one label per voxel "
     "and positive VX, VY, VZ, pixdim or space directions";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
-constexpr std::size_t most_labels = 100;   // that are body unless a person says so: grey images have more
+constexpr std::size_t most_labels = 100;   // of body by default: grey images have more
 
-/// Files of a kind: which they are, their header's check, and their reader.
+/// Functions for a kind of image file: recognition by name, check of the header, and reader.
 struct ImageKind {
   bool (*is)(const std::filesystem::path& file);
-  std::optional<std::int64_t> (*check)(const FileDescriptor& file);  ///< nothing: it is of no such kind
+  std::optional<std::int64_t> (*check)(const FileDescriptor& file);  ///< nullopt: not of this kind
   ChildResult (*read)(const FileDescriptor& file, const std::optional<ValueRange>& range);
 };
 
@@ -47,7 +47,7 @@ const ImageKind& kind_of(const std::filesystem::path& file) {
   return found == kinds.end() ? inr : *found;
 }
 
-/// Refuses voxel sides and an origin that no image has.
+/// Throws Error for voxel sides and an origin that no image has.
 void check_geometry(const VoxelGrid& grid, const std::string& where) {
   const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
   if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
@@ -64,7 +64,8 @@ void check_geometry(const VoxelGrid& grid, const std::string& where) {
   }
 }
 
-/// Refuses a grey image, of whose values nobody knows which are the body. `kinds`: how many labels there are.
+/// Throws Error for a grey image without a range, since its values do not determine the body. `kinds`: number
+/// of labels.
 void check_labels(const ImageHeader& header, std::size_t kinds, const std::string& occurring,
                   const ImageGeometry& image) {
   if (image.range) return;
@@ -85,7 +86,7 @@ void check_labels(const ImageHeader& header, std::size_t kinds, const std::strin
   throw Error(what, image.file.string(), hint);
 }
 
-/// "1", "1 and 2", "1, 2 and 7".
+/// Labels in words: "1", "1 and 2", "1, 2 and 7".
 std::string and_list(const std::vector<std::int32_t>& labels) {
   std::string text = fmt::format("{}", labels.front());
   for (std::size_t k = 1; k < labels.size(); ++k)
@@ -93,7 +94,7 @@ std::string and_list(const std::vector<std::int32_t>& labels) {
   return text;
 }
 
-/// Marks the voxels that carry one of the labels (all but 0 where none are listed).
+/// Marks the voxels with one of the labels (all but 0 if none are listed).
 VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std::string>& notes) {
   const std::string where = image.file.string();
   const std::vector<int>& wanted = image.labels;

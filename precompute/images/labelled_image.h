@@ -11,10 +11,10 @@
 namespace palpate {
 
 /// Reads an image, selects the labels that are body and makes them meshable: one part, with an empty rim,
-/// that nowhere hangs together by an edge alone; with `image.regions` every voxel keeps its label, except
-/// that specks of less than 8 voxels or smaller than a regular tetrahedron of `edge_length` (in the image's
-/// unit) take that of their surroundings. What was changed is told in `notes`. Throws Error for a file that
-/// is not an image, labels that it does not hold, and a body in several large parts.
+/// nowhere connected by an edge alone. With `image.regions` every voxel keeps its label, except that specks
+/// of less than 8 voxels or smaller than a regular tetrahedron of `edge_length` (in the image's unit) take
+/// that of their surroundings. Changes are reported in `notes`. Throws Error for a file that is not an image,
+/// labels that it does not have, and a body of several large parts.
 VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes);
 

@@ -36,13 +36,13 @@ T number_at(std::span<const char> header, std::size_t offset, bool swapped) {
   return std::bit_cast<T>(bytes);
 }
 
-/// What a header says of the voxels.
+/// Description of the voxels in a header.
 struct Dimensions {
   std::array<std::int64_t, 8> dim{};  // their number, then each
   std::int64_t bits = 0;              // of a voxel
   double offset = 0.0;                // of the first voxel in the file [byte]
-  double shift = 0.0;                 // of values, to labels
-  std::array<double, 3> sides{};      // of a voxel, where no matrix says them
+  double shift = 0.0;                 // from values to labels
+  std::array<double, 3> sides{};      // of a voxel, if there is no matrix
   bool has_matrix = false;
 };
 
@@ -77,14 +77,14 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
   return {};
 }
 
-/// The first bytes of a file, as many as the longer of both headers has.
+/// First bytes of a file, as many as the longer of both headers has.
 std::string header_of(gzFile_s* stream) {
   std::string header(size_2, '\0');
   header.resize(read_unpacked(stream, header));
   return header;
 }
 
-/// libnifti's image of a header that read_dimensions knows, without voxels; null where it refuses.
+/// libnifti's image, without voxels, for a header that read_dimensions accepts; null if libnifti refuses it.
 nifti_image* image_of(const std::string& header) {
   if (header.substr(4, 3) == "n+2") {
     nifti_2_header second{};
@@ -96,7 +96,7 @@ nifti_image* image_of(const std::string& header) {
   return nifti_convert_n1hdr2nim(first, nullptr);
 }
 
-/// The voxels, which the image frees, in this machine's byte order.
+/// Reads the voxels, which the image frees, into this machine's byte order.
 bool read_voxels(gzFile_s* stream, nifti_image& image) {
   const auto bytes = static_cast<std::size_t>(image.nvox) * static_cast<std::size_t>(image.nbyper);
   image.data = std::calloc(std::max<std::size_t>(bytes, 1), 1);
@@ -118,7 +118,7 @@ Labels rounded(const nifti_image& image, std::size_t voxels, const std::optional
                      [&](std::size_t v) { return slope * static_cast<double>(values[v]) + shift; });
 }
 
-/// The voxels as labels; none for colours and complex numbers.
+/// Voxels as labels; empty for colours and complex numbers.
 Labels labels_of(const nifti_image& image, std::size_t voxels, const std::optional<ValueRange>& range) {
   switch (image.datatype) {
     case NIFTI_TYPE_UINT8:
@@ -146,14 +146,15 @@ Labels labels_of(const nifti_image& image, std::size_t voxels, const std::option
   }
 }
 
-/// 0 where the header does not say.
+/// Length of a unit [mm]; 0 if the header has none.
 double millimetres(int unit) {
   if (unit == NIFTI_UNITS_METER) return 1e3;
   if (unit == NIFTI_UNITS_MICRON) return 1e-3;
   return unit == NIFTI_UNITS_MM ? 1.0 : 0.0;
 }
 
-/// libnifti would take 1 for such sides, and a negative one may mean a mirror image or nothing.
+/// Throws Error for voxel sides that are not positive: libnifti would replace 0 by 1, and a negative one may
+/// mean a mirror image or nothing.
 void check_sides(const Dimensions& said, const std::string& where) {
   if (said.has_matrix) return;
   for (std::size_t i = 0; i < 3 && static_cast<std::int64_t>(i) < said.dim[0]; ++i) {
@@ -197,7 +198,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
                 "correct the header");
   check_voxels(product, voxels, static_cast<double>(bits) / 8.0, where);
   const auto bytes = static_cast<std::int64_t>(std::ceil(offset + voxels * static_cast<double>(bits) / 8.0));
-  // voxels follow the header and what belongs to it
+  // voxels follow the header and its extensions
   const auto first = static_cast<std::int64_t>(std::max(offset, static_cast<double>(header.size())));
   gzseek(stream.get(), static_cast<z_off_t>(first), SEEK_SET);
   const Counted behind = count_bytes(stream.get(), bytes - first);

@@ -10,17 +10,17 @@
 
 namespace palpate {
 
-/// Whether the name ends so.
+/// True if the name has a NIfTI ending.
 bool is_nifti(const std::filesystem::path& file);
 
-/// Bytes that the reader will hold; nothing where the file has no NIfTI header, plain or gzipped, of one file
-/// that has its voxels as well. Throws Error with the field's name where it has dimensions below 1, comes to
-/// more than check_voxels allows, or asks for more bytes than the file holds, and where all voxels are 0.
+/// Size of the data that the reader will hold [byte]; nullopt if the file has no NIfTI header, plain or
+/// gzipped, of a single file with its voxels. Throws Error with the field's name if dimensions are below 1,
+/// exceed the limit of check_voxels, or need more bytes than the file has, and if all voxels are 0.
 std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file);
 
-/// Reads an image that check_nifti_header has taken; libnifti makes sense of its header. Axes are exchanged
-/// and turned round so that x points to the patient's right, y to the front and z to the head, as near as
-/// they come; lengths are millimetres.
+/// Reads an image accepted by check_nifti_header; libnifti interprets the header. Axes are permuted and
+/// reversed so that x points to the patient's right, y to the front and z to the head, as nearly as possible;
+/// lengths are millimetres.
 ChildResult read_nifti_labels(const FileDescriptor& file, const std::optional<ValueRange>& range);
 
 }  // namespace palpate

@@ -27,10 +27,10 @@ namespace {
 constexpr std::size_t largest_nrrd_header = 1 << 20;  // Slicer's segments are described there
 const char* const complete_nrrd = "use a complete NRRD file (.nrrd) with one label a voxel";
 
-/// What a header says, by teem's numbers of the fields (nrrdField), which has several names for some.
+/// Fields of a header by teem's numbers (nrrdField), since some have several names.
 struct Header {
   std::map<int, std::string> fields;
-  std::size_t bytes = 0;  // up to the first voxel, where those follow
+  std::size_t bytes = 0;  // up to the first voxel, if voxels follow
 
   [[nodiscard]] std::string field(int number) const {
     const auto found = fields.find(number);
@@ -38,7 +38,7 @@ struct Header {
   }
 };
 
-/// Nothing where it is none, or does not end.
+/// Parses the header; nullopt if there is none, or it does not end.
 std::optional<Header> parse(std::string_view text) {
   if (!text.starts_with("NRRD000")) return {};
   Header header;
@@ -57,20 +57,20 @@ std::optional<Header> parse(std::string_view text) {
     const int number = airEnumVal(nrrdField, name.c_str());
     std::erase_if(name, [](unsigned char c) { return std::isalpha(c) == 0; });
     std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
-    // not teem's spellings alone: who writes so means another file
+    // not only in teem's spellings: this key always means another file
     header.fields.emplace(name == "datafile" ? nrrdField_data_file : number, line);
   }
   return {};
 }
 
-/// Bytes of a number of this type; 0 for one that is none.
+/// Size of a number of this type [byte]; 0 for an unknown one.
 std::int64_t bytes_of(const std::string& type) {
   const int known = airEnumVal(nrrdType, type.c_str());
   return known == nrrdTypeUnknown || known == nrrdTypeBlock ? 0
                                                             : static_cast<std::int64_t>(nrrdTypeSize[known]);
 }
 
-/// As NIfTI has them: to the right, to the front, to the head.
+/// Signs of the axes relative to NIfTI's: to the right, to the front, to the head.
 std::array<double, 3> signs_of(int space) {
   switch (space) {
     case nrrdSpaceLeftPosteriorSuperior:
@@ -83,7 +83,7 @@ std::array<double, 3> signs_of(int space) {
   }
 }
 
-/// Whether lengths are millimetres where nothing else is said, as 3D Slicer and ITK have it.
+/// True if lengths are millimetres by default, as in 3D Slicer and ITK.
 bool is_of_a_patient(int space) {
   switch (space) {
     case nrrdSpaceRightAnteriorSuperior:
@@ -96,8 +96,8 @@ bool is_of_a_patient(int space) {
   }
 }
 
-/// The unit of `space units`, without a space of `units` [mm]; 0 where there is none. Throws Error for one
-/// that is not known, and where there are several.
+/// Unit in `space units`, or in `units` without a space [mm]; 0 if there is none. Throws Error for an unknown
+/// one, and for several different ones.
 double unit_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::string& where) {
   static const std::map<std::string, double> units = {
       {"m", 1e3},   {"meter", 1e3},      {"cm", 10.0},         {"centimeter", 10.0},
@@ -131,7 +131,7 @@ double unit_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::
   return unit;
 }
 
-/// The columns of space that are known; else the spacing along the file's own axes.
+/// Position from the known columns of space; else from the spacing along the file's own axes.
 ImagePlace place_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::string& where) {
   ImagePlace place;
   place.unit = unit_of(image, axes, where);
@@ -214,7 +214,7 @@ ChildResult read_nrrd_labels(const FileDescriptor& file, const std::optional<Val
   if (!stream || nrrdRead(image.get(), stream.get(), nullptr) != 0 || image->data == nullptr)
     return {not_an_image, {}};
   if (image->type <= nrrdTypeUnknown || image->type >= nrrdTypeBlock) return {not_scalar, {}};
-  std::vector<unsigned> axes;  // that lie in space
+  std::vector<unsigned> axes;  // axes in space
   for (unsigned k = 0; k < image->dim; ++k) {
     const bool is_along = image->spaceDim != 3 || std::isfinite(image->axis[k].spaceDirection[0]);
     if (is_along && axes.size() < 3) {

@@ -10,16 +10,16 @@
 
 namespace palpate {
 
-/// Whether the name ends so.
+/// True if the name has a NRRD ending.
 bool is_nrrd(const std::filesystem::path& file);
 
-/// Bytes that the reader will hold; nothing where the file has no NRRD header. Throws Error with the field's
-/// name where it has sizes below 1 or comes to more than check_voxels allows, where the voxels are in another
-/// file, where there are fewer bytes than it asks for, and where all voxels are 0.
+/// Size of the data that the reader will hold [byte]; nullopt if the file has no NRRD header. Throws Error
+/// with the field's name if sizes are below 1 or exceed the limit of check_voxels, if the voxels are in
+/// another file, if there are fewer bytes than required, and if all voxels are 0.
 std::optional<std::int64_t> check_nrrd_header(const FileDescriptor& file);
 
-/// Reads an image that check_nrrd_header has taken, by teem, for a child process. Axes are exchanged and
-/// turned round as those of NIfTI; lengths are millimetres unless `space units` says otherwise.
+/// Reads an image accepted by check_nrrd_header, by teem, for a child process. Axes are permuted and reversed
+/// as those of NIfTI; lengths are millimetres unless `space units` says otherwise.
 ChildResult read_nrrd_labels(const FileDescriptor& file, const std::optional<ValueRange>& range);
 
 }  // namespace palpate

@@ -13,8 +13,8 @@
 namespace palpate {
 namespace {
 
-/// What a voxel takes beside its bytes in the file, at the time when the child sends its labels: they, the
-/// same along the axes of space and packed there, and what has arrived here [byte].
+/// Memory per voxel besides its bytes in the file when the child sends its labels: the labels, their copy
+/// along the axes of space, its packed bytes, and the received part [byte].
 constexpr double bytes_per_label = 20.0;
 constexpr std::size_t chunk_bytes = 1 << 20;
 

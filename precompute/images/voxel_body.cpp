@@ -13,15 +13,15 @@ namespace {
 
 constexpr double small_part = 0.01;  // of the largest part
 
-/// A group of voxels that are connected through faces and have the same value.
+/// A group of voxels connected through faces that have the same value.
 template <typename Value>
 struct Part {
   Value value;
   std::size_t voxels;
-  std::size_t first;  ///< one of them
+  std::size_t first;  ///< one of its voxels
 };
 
-/// Calls work(neighbour) for the voxels that share a face with `voxel`.
+/// Calls work(neighbour) for the voxels that have a face in common with `voxel`.
 template <typename Work>
 void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) {
   std::size_t stride = 1;
@@ -38,7 +38,7 @@ void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) 
   }
 }
 
-/// Numbers that turn out to be of the same part: each has an earlier one, and the first has itself.
+/// Numbers found to be of the same part: each refers to an earlier one, and the first to itself.
 class EqualNumbers {
  public:
   Index add() {
@@ -49,7 +49,7 @@ class EqualNumbers {
   Index first(Index number) {
     Index* earlier = &at(number);
     while (*earlier != number) {
-      *earlier = at(*earlier);  // halves the way for the next search
+      *earlier = at(*earlier);  // halves the path for the next search
       number = *earlier;
       earlier = &at(number);
     }
@@ -66,9 +66,8 @@ class EqualNumbers {
   std::vector<Index> earlier_;
 };
 
-/// Gives each voxel the number of an equal one before it, along x, y or z, or a new one; returns which of
-/// these numbers are of the same part (Rosenfeld and Pfaltz, Sequential operations in digital picture
-/// processing, 1966).
+/// Gives each voxel the number of an equal one before it, along x, y or z, or a new one; returns the numbers
+/// of the same part (Rosenfeld and Pfaltz, Sequential operations in digital picture processing, 1966).
 template <typename Value>
 EqualNumbers number_voxels(const VoxelGrid& grid, const std::vector<Value>& values,
                            std::vector<Index>& number_of) {
@@ -97,7 +96,7 @@ EqualNumbers number_voxels(const VoxelGrid& grid, const std::vector<Value>& valu
   return equal;
 }
 
-/// Numbers the parts in the order of their first voxels; `part_of` gets each voxel's.
+/// Numbers the parts in the order of their first voxels; `part_of` gets the part of each voxel.
 template <typename Value>
 std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Value>& values,
                                     std::vector<Index>& part_of) {
@@ -105,7 +104,8 @@ std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Val
   EqualNumbers equal = number_voxels(grid, values, part_of);
   std::vector<Index> parts_of_numbers;
   Index count = 0;
-  for (Index number = 0; number < equal.count(); ++number) {  // the first of a part is its first voxel's
+  for (Index number = 0; number < equal.count(); ++number) {  // the first number of a part is that of its
+                                                              // first voxel
     const Index first = equal.first(number);
     parts_of_numbers.push_back(first == number ? count++ : parts_of_numbers[static_cast<std::size_t>(first)]);
   }
@@ -126,8 +126,8 @@ std::string shown(const VoxelGrid& grid, std::size_t voxel) {
   return fmt::format("({:f}, {:f}, {:f})", x[0], x[1], x[2]);
 }
 
-/// Takes the label from parts that are smaller than `smallest`, never from the largest; returns how many
-/// voxels of how many parts of each label.
+/// Removes the label of parts smaller than `smallest`, but never of the largest; returns the numbers of
+/// voxels and parts for each label.
 std::map<Index, std::array<std::size_t, 2>> unlabel_specks(VoxelBody& body, std::size_t smallest) {
   std::vector<Index> part_of;
   const auto parts = find_parts(body, body.labels, part_of);
@@ -151,7 +151,7 @@ std::map<Index, std::array<std::size_t, 2>> unlabel_specks(VoxelBody& body, std:
   return specks;
 }
 
-/// Spreads the labels, one layer of voxels after the other, over the body's voxels that have none.
+/// Spreads the labels, one layer of voxels after the other, over the body's voxels without one.
 void spread_labels(VoxelBody& body) {
   std::queue<std::size_t> front;
   const auto lacks_label = [&](std::size_t v) {

@@ -18,7 +18,7 @@
 namespace palpate {
 namespace {
 
-/// The first words of a file, none where it cannot be read.
+/// First words of a file; none if it cannot be read.
 std::vector<std::string> words_of(const std::string& file) {
   std::ifstream in(file);
   std::vector<std::string> words;
@@ -26,7 +26,7 @@ std::vector<std::string> words_of(const std::string& file) {
   return words;
 }
 
-/// A number that is not negative; nothing for "max" and -1, which set no limit.
+/// A nonnegative number; nullopt for "max" and -1, which set no limit.
 std::optional<double> number(const std::vector<std::string>& words, std::size_t at) {
   if (at >= words.size()) return {};
   double value = 0.0;
@@ -36,8 +36,8 @@ std::optional<double> number(const std::vector<std::string>& words, std::size_t 
   return value;
 }
 
-/// Calls visit(folder, is_v2) for each control group of a controller that this process is in, from the
-/// innermost to the root: a limit of each holds.
+/// Calls visit(folder, is_v2) for each control group of a controller that contains this process, from the
+/// innermost to the root: the limits of all of them apply.
 void for_each_group(const std::string& root, const std::string& controller,
                     const std::function<void(const std::string&, bool)>& visit) {
   std::ifstream groups(root + "/proc/self/cgroup");
@@ -57,7 +57,7 @@ void for_each_group(const std::string& root, const std::string& controller,
 }
 
 int processors_of_affinity() {
-  // A mask of this size is too small where there are more processors than that.
+  // A mask of this size is too small if there are more processors.
   for (int processors = 1024; processors <= (1 << 20); processors *= 2) {
     cpu_set_t* const mask = CPU_ALLOC(static_cast<std::size_t>(processors));
     if (mask == nullptr) break;
@@ -89,7 +89,7 @@ std::int64_t allotted_memory(const std::string& root) {
   for_each_group(root, "memory", [&](const std::string& group, bool is_v2) {
     const auto limit = number(words_of(group + (is_v2 ? "/memory.max" : "/memory.limit_in_bytes")), 0);
     const auto used = number(words_of(group + (is_v2 ? "/memory.current" : "/memory.usage_in_bytes")), 0);
-    if (!limit || !used || *limit > 1e18) return;  // v1 says "none" by a huge number
+    if (!limit || !used || *limit > 1e18) return;  // v1 expresses "none" by a huge number
     const std::string cache = is_v2 ? "" : "total_";
     double free = *limit - *used;
     const std::vector<std::string> stat = words_of(group + "/memory.stat");
@@ -98,7 +98,7 @@ std::int64_t allotted_memory(const std::string& root) {
         free += number(stat, k + 1).value_or(0.0);
     memory = std::min(memory, std::max(free, 1.0));
   });
-  // What Slurm has set aside, where it does not limit it by control groups [MB].
+  // Slurm's allocation, in case Slurm does not enforce it by control groups [MB].
   const auto of_slurm = [](const char* name) {
     const char* const text = std::getenv(name);
     return text == nullptr ? std::nullopt : number({text}, 0);

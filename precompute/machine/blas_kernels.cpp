@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-// Without AVX2 and FMA, as openblas_get_corename has them.
+// Cores without AVX2 and FMA, as named by openblas_get_corename.
 constexpr std::array<std::string_view, 18> old_cores = {
     "Unknown", "Katmai",       "Coppermine", "Northwood",  "Prescott", "Banias",
     "Atom",    "Core2",        "Penryn",     "Dunnington", "Nehalem",  "Athlon",

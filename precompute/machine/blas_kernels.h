@@ -6,29 +6,29 @@
 
 namespace palpate {
 
-/// Instructions of a processor that OpenBLAS has kernels for.
+/// Instruction sets of a processor for which OpenBLAS has kernels.
 struct Instructions {
-  bool avx2 = false;    ///< and FMA
-  bool avx512 = false;  ///< F, CD, BW, DQ and VL: those of Skylake-X
+  bool avx2 = false;    ///< AVX2 and FMA
+  bool avx512 = false;  ///< F, CD, BW, DQ and VL, as in Skylake-X
 };
 
-/// Those of the processor that this runs on.
+/// Instruction sets of this processor.
 Instructions instructions_here();
 
-/// Kernels, as OPENBLAS_CORETYPE names them, that take half the time of those of `core`, the name that
-/// OpenBLAS has for the processor, or less; empty where there are none. OpenBLAS takes processors that came
-/// after it for very old ones (its issue 4267).
+/// Kernels, by their name for OPENBLAS_CORETYPE, that take at most half the time of those of `core`,
+/// OpenBLAS's name for the processor; empty if there are none. OpenBLAS mistakes processors newer than itself
+/// for very old ones (its issue 4267).
 std::string faster_kernels(std::string_view core, const Instructions& instructions);
 
 constexpr const char* asked_kernels = "OPENBLAS_CORETYPE";
-constexpr const char* kernels_before = "PALPATE_KERNELS_BEFORE";  ///< of a program that was started anew
+constexpr const char* kernels_before = "PALPATE_KERNELS_BEFORE";  ///< in a program that was restarted
 
-/// Kernels to ask for where OpenBLAS has chosen those of another age. Empty: its choice fits, or somebody has
-/// chosen, or the program was started anew for them already.
+/// Kernels to request if OpenBLAS has chosen those of an old processor. Empty if its choice fits, the user
+/// has chosen, or the program was already restarted for them.
 std::string kernels_to_ask_for();
 
-/// The kernels in use, and what a person is to know of them: that the program was started anew for them, or
-/// that OPENBLAS_CORETYPE asks for slow ones. Empty: nothing.
+/// Kernels in use, and a note for the user: that the program was restarted for them, or that
+/// OPENBLAS_CORETYPE requests slow ones. Empty if there is nothing to report.
 struct KernelsInUse {
   std::string name;
   std::string note;

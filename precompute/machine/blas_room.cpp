@@ -28,7 +28,7 @@ std::int64_t needed(int threads) {
   return other_needs + threads * (blas_buffer + thread_stack);
 }
 
-/// "512K", in kibibytes where there is no letter; nothing where libgomp does not understand it either.
+/// Reads "512K", without a letter in kibibytes; nullopt if libgomp does not understand it either.
 std::optional<std::size_t> stack_size(const char* text) {
   text += std::strspn(text, " \t");
   std::size_t size = 0;
@@ -42,7 +42,7 @@ std::optional<std::size_t> stack_size(const char* text) {
   return size << 10 * power;
 }
 
-/// Whether a thread starts with a stack of this size.
+/// True if a thread starts with a stack of this size.
 bool starts_with(std::size_t bytes) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
@@ -84,7 +84,7 @@ void take_blas_room(int threads) {
                     threads, threads == 1 ? "" : "s", threads == 1 ? "s" : "",
                     static_cast<double>(needed(threads)) / 1e6, static_cast<double>(*free) / 1e6),
         "memory", std::string("Raise the limit (ulimit -v)") + (threads > 1 ? ", or use fewer --jobs" : ""));
-  // OpenBLAS's own, which keeps for later what is given back; other libraries of BLAS have none
+  // OpenBLAS's own allocator, which keeps freed memory for later; other BLAS libraries have none
   const auto take = reinterpret_cast<void* (*)(int)>(::dlsym(RTLD_DEFAULT, "blas_memory_alloc"));
   const auto give_back = reinterpret_cast<void (*)(void*)>(::dlsym(RTLD_DEFAULT, "blas_memory_free"));
   if (take == nullptr || give_back == nullptr) return;

@@ -3,16 +3,16 @@
 
 namespace palpate {
 
-/// Throws Error where OMP_STACKSIZE is so small that OpenMP's threads do not start, which would end the
+/// Throws Error if OMP_STACKSIZE is so small that OpenMP's threads would not start, which would end the
 /// program.
 void check_stack_size();
 
-/// Threads that can call OpenBLAS at a time: as many as `wanted` where address space is not limited, else 1
-/// or more.
+/// Number of threads that can call OpenBLAS at a time: `wanted` if address space is not limited, else as
+/// many as fit, at least 1.
 int threads_with_room(int wanted);
 
-/// Takes what OpenBLAS needs for so many threads, where address space is limited: later it would wait for
-/// ever. Throws Error where that is too much.
+/// Reserves OpenBLAS's memory for so many threads if address space is limited; later OpenBLAS would wait for
+/// it forever. Throws Error if that is too much.
 void take_blas_room(int threads);
 
 }  // namespace palpate

@@ -1,12 +1,12 @@
-// How OpenBLAS is started.
+// Start of OpenBLAS.
 #pragma once
 
 namespace palpate {
 
-/// Starts the program anew by `argv`, at most once for each reason, where OpenBLAS would serve it badly as it
-/// has begun: with kernels of another age (kernels_to_ask_for); or with threads of its own where address
-/// space is limited, each of which waits for ever for 128 MiB that it does not get. For the first line of
-/// `main`: before MPI and threads. Goes on as it is where a program cannot be started.
+/// Restarts the program with `argv`, at most once for each reason, if OpenBLAS would serve it badly
+/// otherwise: with kernels of an old processor (kernels_to_ask_for); or with threads of its own while address
+/// space is limited, each of which waits forever for 128 MiB that it does not get. Must be the first line of
+/// `main`: before MPI and threads. Continues unchanged if a program cannot be started.
 void start_blas(char** argv);
 
 }  // namespace palpate

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t max_element_dofs = std::size_t{3} * max_element_nodes;
 
-/// Numbers the free dofs, those of a node together.
+/// Numbers the free dofs, keeping those of a node together.
 void number_dofs(const ElasticBody& body, Stiffness& result) {
   const int d = body.mesh.dimension();
   result.free_of_dof.assign(static_cast<std::size_t>(d) * body.mesh.nodes.size(), -1);
@@ -26,13 +26,13 @@ void number_dofs(const ElasticBody& body, Stiffness& result) {
   result.node_start.push_back(static_cast<std::int64_t>(result.free_dofs.size()));
 }
 
-/// For each free node the free nodes with a higher number that share an element with it, ascending.
+/// For each free node the free nodes with a higher number that have an element in common with it, ascending.
 struct UpperNeighbours {
   std::vector<std::int64_t> start;  ///< [nodes + 1]
   std::vector<Index> node;
 };
 
-/// Free node of each mesh node, -1 where every dof is held.
+/// Free node of each mesh node, -1 if all its dofs are held.
 std::vector<Index> free_nodes(const ElasticBody& body, const Stiffness& stiffness) {
   std::vector<Index> result(body.mesh.nodes.size(), -1);
   for (std::size_t a = 0; a + 1 < stiffness.node_start.size(); ++a) {
@@ -42,7 +42,7 @@ std::vector<Index> free_nodes(const ElasticBody& body, const Stiffness& stiffnes
   return result;
 }
 
-/// Calls f(a, b) with free nodes a < b for every two free nodes of each element.
+/// Calls f(a, b) for every two free nodes a < b of each element.
 template <class F>
 void for_each_free_pair(const Mesh& mesh, const std::vector<Index>& free_node, F f) {
   for (Index e = 0; e < mesh.elements(); ++e) {
@@ -79,7 +79,7 @@ UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>
   return unique;
 }
 
-/// The lower triangle's pattern with zero values: in a column, the later dofs of its own node, then all dofs
+/// Pattern of the lower triangle with zero values: in a column, the later dofs of its own node, then all dofs
 /// of the higher neighbours.
 SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::int64_t>& node_start) {
   std::vector<std::int64_t> columns{0}, rows;

@@ -12,17 +12,17 @@ namespace palpate {
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int64_t>;
 
-/// K of the free dofs, and what couples them to the held ones. A dof of the mesh is d node + axis.
+/// K of the free dofs, and their coupling to the held ones. A dof of the mesh is d node + axis.
 struct Stiffness {
   std::vector<std::int64_t> free_dofs;    ///< [n] dof of the mesh of each free dof, ascending
-  std::vector<std::int64_t> free_of_dof;  ///< [d N] free dof of each dof of the mesh, -1 where it is held
-  std::vector<std::int64_t> node_start;   ///< [free nodes + 1] first free dof of each node that has one
+  std::vector<std::int64_t> free_of_dof;  ///< [d N] free dof of each dof of the mesh, -1 if held
+  std::vector<std::int64_t> node_start;   ///< [free nodes + 1] first free dof of each node that has any
   SparseMatrix K;  ///< [n, n] lower triangle [N/m]; the block of each pair of neighbour nodes is complete
-  std::vector<double> held_force;  ///< [n] K_fc u_c: force that the prescribed displacements of the held dofs
-                                   ///< would need on the free ones [N]
+  std::vector<double> held_force;  ///< [n] K_fc u_c: force on the free dofs that the prescribed displacements
+                                   ///< of the held ones require [N]
 };
 
-/// What K is assembled from. `prescribed` [N] may be empty: all held dofs stay at zero.
+/// Data from which K is assembled. `prescribed` [N] may be empty: all held dofs stay at zero.
 struct ElasticBody {
   const Mesh& mesh;
   Analysis analysis;
@@ -33,7 +33,7 @@ struct ElasticBody {
   std::span<const Vec3> prescribed;
 };
 
-/// The parts of a baked model.
+/// ElasticBody of a baked model.
 ElasticBody elastic_body(const Model& model);
 
 /// K = sum over elements of the integral of t B^T D B (theory.md section 1). At least one dof must be free.

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr double bytes_per_second = 10e9;  // at which a step reads K_bar^-1
+constexpr double bytes_per_second = 10e9;  // rate at which a step reads K_bar^-1
 constexpr Index usual_modes = 100;
 
 /// K_bar^-1 of the stored dofs, column by column.
@@ -30,7 +30,7 @@ std::shared_ptr<const void> packed_inverse(const Factor& K_bar, std::span<const 
   return {values, values->data()};
 }
 
-/// The shapes' rows of the stored dofs, one mode after the other.
+/// Rows of the shapes at the stored dofs, one mode after the other.
 std::vector<double> at_stored_dofs(const Eigen::MatrixXd& shapes, std::span<const std::int64_t> stored_dofs) {
   std::vector<double> rows;
   rows.reserve(static_cast<std::size_t>(shapes.cols()) * stored_dofs.size());
@@ -61,7 +61,8 @@ DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int
                   options.place, "set scope = \"full\" in [storage], or method = \"modal\"");
     plan.reason = numbers;
     plan.file_bytes = packed_bytes;
-    plan.memory_bytes = matrices + 3 * K.nonZeros() * 3 * scalar;  // M and C_d: sorted, kept, being written
+    plan.memory_bytes = matrices + 3 * K.nonZeros() * 3 * scalar;  // M and C_d: sorted, kept, and being
+                                                                   // written
     return plan;
   }
   const std::int64_t free = K.rows();

@@ -1,4 +1,4 @@
-// What the file keeps for Newmark's method (theory.md section 5).
+// Data for Newmark's method in the file (theory.md section 5).
 #pragma once
 
 #include <cstdint>
@@ -13,37 +13,36 @@
 
 namespace palpate {
 
-/// How dynamics will be stored, known before anything is factorised.
+/// Plan for storing dynamics, made before anything is factorised.
 struct DynamicsPlan {
   DynamicsMethod method = DynamicsMethod::none;
   Index modes = 0;                ///< modal
-  std::int64_t file_bytes = 0;    ///< of the packed inverse or the shapes, the bulk
-  std::int64_t memory_bytes = 0;  ///< beside factor and workspaces
-  std::string reason;             ///< why this method, with the numbers: one sentence
+  std::int64_t file_bytes = 0;    ///< for the packed inverse or the shapes, most of the data
+  std::int64_t memory_bytes = 0;  ///< besides factor and workspaces
+  std::string reason;             ///< reason for this method, with the numbers: one sentence
 };
 
-/// Decides for the method where it is left open: packed where the scope is full and K_bar^-1 can be read once
-/// in a time step at 10 GB/s. Throws Error for packed without the full scope and for more modes than free
-/// dofs.
+/// Chooses the method if it is not given: packed if the scope is full and K_bar^-1 can be read once per time
+/// step at 10 GB/s. Throws Error for packed without the full scope and for more modes than free dofs.
 DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int64_t stored_dofs,
                            const SparseMatrix& K, Precision precision);
 
-/// M and C_d = a M + b K of the stored dofs. `stored_dofs`: dof of K of each, -1 where it is held (its row
-/// and column are empty). K and M are lower triangles in one pattern.
+/// M and C_d = a M + b K of the stored dofs. `stored_dofs`: dof of K of each, -1 if held (its row and column
+/// are empty). K and M are lower triangles with the same pattern.
 MassAndDamping mass_and_damping(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,
                                 std::span<const std::int64_t> stored_dofs);
 
-/// Everything but the packed inverse. `factor`: of K, computed. Nothing where the sharing was stopped.
+/// Computes everything except the packed inverse. `factor`: of K, computed. Returns nullopt if stopped.
 std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
                                                 const SparseMatrix& K, const SparseMatrix& M,
                                                 const Factor& factor,
                                                 std::span<const std::int64_t> stored_dofs, Sharing& sharing);
 
-/// Dof of K of each stored dof of the model, -1 where it is held.
+/// Dof of K of each stored dof of the model, -1 if held.
 std::vector<std::int64_t> stored_dofs_of(const Model& model, const Stiffness& stiffness);
 
-/// All of it, in memory, for a model that has mesh, materials, held nodes, scope and stored nodes; K_bar^-1
-/// in the given precision, by plain solves: for models that are small.
+/// Complete dynamics in memory for a model that has mesh, materials, held nodes, scope and stored nodes;
+/// K_bar^-1 in the given precision, by plain solves: for small models.
 StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options, Precision precision);
 
 }  // namespace palpate

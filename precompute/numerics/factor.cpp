@@ -24,7 +24,7 @@ cholmod_sparse view(const SparseMatrix& A, int values) {
   return view;
 }
 
-/// Lower pattern of the node graph: the first dof of every node stands for it.
+/// Lower pattern of the node graph: the first dof of every node represents it.
 SparseMatrix node_graph(const SparseMatrix& K, std::span<const std::int64_t> node_start) {
   const auto nodes = static_cast<std::int64_t>(node_start.size()) - 1;
   std::vector<std::int64_t> node_of_first(static_cast<std::size_t>(K.rows()), -1);

@@ -15,11 +15,11 @@ namespace palpate {
 
 /// P K P^T = L L^T, supernodal, ordered by METIS on the graph of the nodes, so that the dofs of a node stay
 /// together. The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
-/// Where one process cannot hold the numbers, `spread` hands them to several, which then factorise and solve
-/// together.
+/// If one process cannot hold the numbers, `spread` distributes them over several, which then factorise and
+/// solve together.
 class Factor {
  public:
-  /// K: lower triangle with complete blocks of nodes, as assemble_stiffness leaves it; node a has the dofs
+  /// K: lower triangle with complete blocks of nodes, as made by assemble_stiffness; node a has the dofs
   /// node_start[a] .. node_start[a + 1] - 1. Keeps a reference to K.
   Factor(const SparseMatrix& K, std::span<const std::int64_t> node_start);
   ~Factor();
@@ -28,13 +28,13 @@ class Factor {
 
   /// Leaves the numbers, which are not computed yet, to several processes.
   void spread(std::unique_ptr<SpreadNumbers> numbers) { spread_ = std::move(numbers); }
-  [[nodiscard]] SpreadNumbers* spread_numbers() const noexcept { return spread_.get(); }  ///< or null
+  [[nodiscard]] SpreadNumbers* spread_numbers() const noexcept { return spread_.get(); }  ///< may be null
 
-  /// Numeric factorisation. Throws Error when K is not positive definite or memory is short.
+  /// Numeric factorisation. Throws Error if K is not positive definite or memory is short.
   void factorize();
 
-  /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve or
-  /// the processes that have the numbers.
+  /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve or the
+  /// processes that hold the numbers.
   [[nodiscard]] std::vector<double> solve(std::span<const double> b, std::int64_t columns = 1) const;
 
   [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }  ///< n

@@ -18,7 +18,7 @@ bool holds(std::uint8_t axes, std::size_t axis) {
 FixedNodes hold_nodes(const Mesh& mesh, const std::vector<Fixing>& fixed, const std::string& file) {
   const std::size_t count = mesh.nodes.size();
   FixedNodes held{std::vector<std::uint8_t>(count, 0), std::vector<Vec3>(count, Vec3::Zero())};
-  std::vector<std::array<std::size_t, 3>> holder(count);  // entry that holds each dof first
+  std::vector<std::array<std::size_t, 3>> holder(count);  // first entry that holds each dof
 
   for (std::size_t entry = 0; entry < fixed.size(); ++entry) {
     const std::string where = fmt::format("{}: [[fixed]] number {}", file, entry + 1);

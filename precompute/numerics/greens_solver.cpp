@@ -5,7 +5,7 @@
 namespace palpate {
 namespace {
 
-/// How many of the ascending positions are before `end`.
+/// Number of the ascending positions before `end`.
 std::int64_t count_before(std::span<const std::int64_t> positions, std::int64_t end) {
   return std::lower_bound(positions.begin(), positions.end(), end) - positions.begin();
 }
@@ -114,7 +114,7 @@ void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& wo
   }
 
   constexpr std::int64_t tile =
-      16;  // rows of X that are spread over the columns at a time: each column gets a cache line
+      16;  // rows of X that are distributed to the columns at a time: each column gets a cache line
   const std::int64_t first_free = free_before_[static_cast<std::size_t>(first)];
   for (std::int64_t row = first; row < n; row += tile) {
     const std::int64_t row_end = std::min(row + tile, n);

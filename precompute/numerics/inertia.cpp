@@ -57,7 +57,7 @@ class EntriesBySupernode {
   std::vector<Entry> entries_;
 };
 
-/// D = L D L^T in the lower triangle of a block of a front, and its negative pivots.
+/// Factorises D = L D L^T in the lower triangle of a block of a front; returns the number of negative pivots.
 std::int64_t eliminate_block(Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> D) {
   std::int64_t negative = 0;
   for (Eigen::Index k = 0; k < D.rows(); ++k) {
@@ -74,8 +74,8 @@ std::int64_t eliminate_block(Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> D) {
   return negative;
 }
 
-/// Eliminates the first `columns` of a front F, of which the lower triangle counts; what is below and to the
-/// right becomes their Schur complement. Returns the negative pivots.
+/// Eliminates the first `columns` of a front F, given by its lower triangle; the rest below and to the right
+/// becomes their Schur complement. Returns the number of negative pivots.
 std::int64_t eliminate(Matrix& F, std::int64_t columns) {
   std::int64_t negative = 0;
   Matrix scaled;  // L D of the panel's rows below

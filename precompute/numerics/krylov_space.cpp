@@ -7,7 +7,7 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-// What is one item. The bytes depend on these.
+// Sizes of an item. The bytes depend on these.
 constexpr std::int64_t rows_together = 4096, columns_together = 4;
 
 std::int64_t pieces(std::int64_t whole, std::int64_t together) {

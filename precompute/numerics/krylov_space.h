@@ -1,4 +1,4 @@
-// Vectors that an eigenvalue solver keeps, and the work on them that threads share.
+// Vectors of an eigenvalue solver, and parallel operations on them.
 #pragma once
 
 #include <Eigen/Dense>
@@ -13,8 +13,8 @@
 
 namespace palpate {
 
-/// K^-1 and M on blocks of vectors [n, any], by threads. Bytes depend on no number of threads. Once
-/// `stopped`, results are of no use.
+/// K^-1 and M applied to blocks of vectors [n, any] by threads. The bytes do not depend on the number of
+/// threads. Once `stopped`, results are not valid.
 class SharedPencil {
  public:
   /// `factor`: of K, computed. M: lower triangle. Keeps references.
@@ -27,7 +27,7 @@ class SharedPencil {
   [[nodiscard]] Eigen::MatrixXd mass_times(const Eigen::MatrixXd& W);                         ///< M W
   [[nodiscard]] Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);  ///< A^T B
 
-  /// Threads on items, until they are stopped.
+  /// Runs `work` on items by threads, unless stopped.
   void share(std::int64_t items, const std::function<void(std::int64_t item, int worker)>& work);
   /// Calls work(item) for each item, stopped or not.
   template <class Work>
@@ -38,13 +38,13 @@ class SharedPencil {
  private:
   const Factor& factor_;
   SupernodalSweeps sweeps_;
-  std::vector<SupernodalSweeps::Workspace> workspaces_;  // of each thread
+  std::vector<SupernodalSweeps::Workspace> workspaces_;  // per thread
   SparseMatrix M_;                                       // without the zeros of K's pattern
   Sharing& sharing_;
   bool stopped_ = false;
 };
 
-/// V [n, size] of vectors that are orthonormal in M.
+/// V [n, size]: vectors that are orthonormal in M.
 class KrylovSpace {
  public:
   KrylovSpace(SharedPencil& pencil, std::int64_t capacity);
@@ -59,7 +59,7 @@ class KrylovSpace {
 
  private:
   SharedPencil& pencil_;
-  std::vector<Eigen::MatrixXd> blocks_;  // of rows of V, [rows, capacity]
+  std::vector<Eigen::MatrixXd> blocks_;  // blocks of rows of V, [rows, capacity]
   std::int64_t size_ = 0;
 };
 

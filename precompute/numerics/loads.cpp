@@ -16,7 +16,7 @@ class Loader {
   Loader(const Description& description, const MeshedBody& body, std::vector<Vec3>& f)
       : description_(description), body_(body), mesh_(body.mesh), f_(f) {}
 
-  /// `where` names the load in errors.
+  /// Adds a load; `where` names it in errors.
   void add(const Load& load, const std::string& where) const {
     std::visit([&](const auto& kind) { add(kind, where); }, load);
   }
@@ -80,8 +80,8 @@ class Loader {
     return result;
   }
 
-  /// Nodes of each facet that has the tag. Where a body is one element thick, nodes do not tell: a side
-  /// between two tagged ones has all its nodes on them.
+  /// Nodes of each facet with the tag. In a body one element thick nodes do not suffice: a side between two
+  /// tagged ones has all its nodes on them.
   [[nodiscard]] std::set<std::vector<Index>> tagged_facets(Index tag) const {
     std::set<std::vector<Index>> facets;
     for (std::size_t t = 0; t < mesh_.facet_tags.size(); ++t)

@@ -1,4 +1,4 @@
-// Loads and the rest state that they give.
+// Loads, and the rest state under them.
 #pragma once
 
 #include <vector>
@@ -11,10 +11,10 @@ namespace palpate {
 
 /// Nodal forces of all loads [N] N on every mesh node: nodal forces, tractions and gravity as described, and
 /// the initial strains of the materials, integral of t B^T D eps_0 (Fagerholt eq. 3.25-3.30; theory.md
-/// section 1). Throws Error for a traction whose selection holds no whole facet of the boundary.
+/// section 1). Throws Error for a traction whose selection contains no whole facet of the boundary.
 std::vector<Vec3> nodal_loads(const Description& description, const MeshedBody& body);
 
-/// u0 [N] of every mesh node [m]: K u0 = loads on the free dofs, the held ones as prescribed.
+/// u0 [N] of every mesh node [m]: K u0 = loads on the free dofs, held ones as prescribed.
 std::vector<Vec3> rest_displacement(const Factor& factor, const Stiffness& stiffness,
                                     const std::vector<Vec3>& loads, const std::vector<Vec3>& prescribed,
                                     int dimension);

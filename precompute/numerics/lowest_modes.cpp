@@ -20,22 +20,22 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 constexpr double tolerance = 1e-12;       // of residuals, relative
-constexpr double smallest_gap = 1e-6;     // between omega^2 that are apart, relative
-constexpr double dependent = 1e-13;       // squared norm of a vector that others span, relative
+constexpr double smallest_gap = 1e-6;     // between omega^2 that count as distinct, relative
+constexpr double dependent = 1e-13;       // squared norm of a vector in the span of others, relative
 constexpr std::int64_t widest_block = 8;  // wider ones take more solves: the degree in K^-1 M counts
 constexpr int restarts = 100;
 
-/// Vectors that a step adds.
+/// Number of vectors added per step.
 std::int64_t block_size(std::int64_t wanted) {
   return std::clamp<std::int64_t>(wanted / 3, 1, widest_block);
 }
 
-/// Vectors that Lanczos' method keeps.
+/// Number of vectors that the Lanczos method keeps.
 std::int64_t basis_size(std::int64_t wanted, std::int64_t dofs) {
   return std::min(dofs, 3 * wanted + 4 * block_size(wanted) + 20);
 }
 
-/// Unit modal mass and a sign that does not hang on the method.
+/// Scales to unit modal mass, with a sign that does not depend on the method.
 void normalize(Eigen::MatrixXd& shapes, const SparseMatrix& M) {
   for (Eigen::Index i = 0; i < shapes.cols(); ++i) {
     auto phi = shapes.col(i);
@@ -61,7 +61,7 @@ Modes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count
   return modes;
 }
 
-/// W := W R^-1, orthonormal in M, with as many vectors as W has independent ones. Returns R. M_W follows.
+/// W := W R^-1, orthonormal in M, with as many vectors as W has independent ones. Returns R. Updates M_W.
 Matrix normalise(SharedPencil& pencil, Matrix& W, Matrix& M_W) {
   const Matrix gram = pencil.product(W, M_W);
   if (pencil.stopped()) return Matrix::Identity(W.cols(), W.cols());
@@ -90,7 +90,7 @@ class BlockLanczos {
         capacity_(capacity),
         random_(seed) {}
 
-  /// Whether the `wanted` largest eigenvalues of A have converged.
+  /// Iterates; returns true if the `wanted` largest eigenvalues of A have converged.
   bool search() {
     begin_anew();
     std::int64_t next_look = 2 * wanted_;
@@ -108,7 +108,7 @@ class BlockLanczos {
     return false;
   }
 
-  /// Ascending omega, and the shapes of the first `count`.
+  /// Modes with ascending omega, and the shapes of the first `count`.
   [[nodiscard]] Modes modes(std::int64_t count) {
     Modes modes;
     for (std::int64_t i = 0; i < wanted_; ++i) modes.omega.push_back(1.0 / std::sqrt(values_[last(i)]));
@@ -119,13 +119,13 @@ class BlockLanczos {
  private:
   [[nodiscard]] Eigen::Index last(std::int64_t i) const { return values_.size() - 1 - i; }
 
-  /// Takes what V has out of W, and makes W orthonormal. Returns the coefficients of V and R.
+  /// Removes the components along V from W, and makes W orthonormal. Returns the coefficients of V and R.
   std::pair<Matrix, Matrix> orthonormalise(Matrix& W, Matrix& M_W) {
     M_W = pencil_.mass_times(W);
     Matrix C = space_.coefficients(M_W), R = Matrix::Identity(W.cols(), W.cols());
     space_.remove(C, W);
     for (int pass = 0; pass < 2;
-         ++pass) {  // what rounding has left of V in W is small only beside what W was
+         ++pass) {  // rounding leaves components along V that are small only relative to the original W
       M_W = pencil_.mass_times(W);
       R = normalise(pencil_, W, M_W) * R;
       if (pass == 1) break;
@@ -136,7 +136,7 @@ class BlockLanczos {
     return {C, R};
   }
 
-  /// A block that nothing leads to.
+  /// Sets Q to a random block orthogonal to V.
   void begin_anew() {
     Matrix f(pencil_.order(), width_);
     for (double& entry : f.reshaped()) entry = uniform(random_);
@@ -159,11 +159,11 @@ class BlockLanczos {
     Q_ = std::move(W);
     M_Q_ = std::move(M_W);
     if (Q_.cols() > 0) return;
-    coupling_ = Matrix::Zero(1, width);  // what V spans is closed
+    coupling_ = Matrix::Zero(1, width);  // V spans an invariant subspace
     begin_anew();
   }
 
-  /// Solves in V; whether the residuals of the wanted are small.
+  /// Solves in V; returns true if the residuals of the wanted eigenvalues are small.
   bool look() {
     const Eigen::SelfAdjointEigenSolver<Matrix> solver(H_);
     values_ = solver.eigenvalues();
@@ -175,7 +175,7 @@ class BlockLanczos {
     return true;
   }
 
-  /// V keeps the best of what it spans.
+  /// Reduces V to the best vectors of its span.
   void thicken() {
     const std::int64_t kept = wanted_ + (capacity_ - width_ - wanted_) / 3;
     space_.replace(vectors_.rightCols(kept));
@@ -192,8 +192,8 @@ class BlockLanczos {
   Matrix vectors_;
 };
 
-/// More vectors of a frequency than a block has come in by rounding alone, so a larger basis may find what a
-/// smaller one has left out.
+/// Repeats Lanczos with larger bases: vectors of one frequency beyond the block size appear by rounding
+/// alone, so a larger basis may find modes that a smaller one has missed.
 std::optional<Modes> lanczos(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
                              std::int64_t count, Sharing& sharing) {
   SharedPencil pencil(factor, M, sharing);

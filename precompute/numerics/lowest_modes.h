@@ -11,36 +11,35 @@
 
 namespace palpate {
 
-/// The lowest solutions of K phi = omega^2 M phi.
+/// Lowest solutions of K phi = omega^2 M phi.
 struct Modes {
   std::vector<double> omega;  ///< [k + 1] angular frequencies [rad/s], ascending; the last is that of the
-                              ///< first mode that is not among the shapes, infinity when there is none
-  Eigen::MatrixXd shapes;     ///< [n, k] of the dofs of K, phi^T M phi = 1 [1/sqrt(kg)]; the entry of largest
+                              ///< first mode not among the shapes, infinity if there is none
+  Eigen::MatrixXd shapes;     ///< [n, k] at the dofs of K, phi^T M phi = 1 [1/sqrt(kg)]; the entry of largest
                               ///< magnitude is positive
 };
 
-/// More dofs than these take too long to be solved densely.
+/// Largest number of dofs that is solved densely.
 inline constexpr std::int64_t most_dense_dofs = 2000;
 
-/// Whether `count` modes of `dofs` are so many that all are computed.
+/// True if `count` modes of `dofs` are so many that all are computed.
 bool dense_modes(std::int64_t count, std::int64_t dofs) noexcept;
 
-/// Bytes that lowest_modes takes at most.
+/// Peak memory of lowest_modes [byte].
 std::int64_t modes_bytes(std::int64_t count, std::int64_t dofs) noexcept;
 
-/// The `count` <= n lowest modes, by block Lanczos on K^-1 M with thick restarts (Wu and Simon 2000), where
-/// they are more than a third of all by a dense solver. `factor`: of K, computed. K and M: lower triangles.
-/// That none is left out is proved by Sylvester's law of inertia. Bytes depend on no number of threads or
-/// processes. Nothing where the sharing was stopped. Throws Error where they cannot be found.
+/// The `count` <= n lowest modes, by block Lanczos on K^-1 M with thick restarts (Wu and Simon 2000); by a
+/// dense solver if they are more than a third of all. `factor`: of K, computed. K and M: lower triangles.
+/// Sylvester's law of inertia proves that none is missing. The bytes do not depend on the number of threads
+/// or processes. Nullopt if stopped. Throws Error if they cannot be found.
 std::optional<Modes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
                                   std::int64_t count, Sharing& sharing);
 
-/// How many omega^2 are below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). `analysed`:
-/// K. Throws Error where a pivot is zero.
+/// Number of omega^2 below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). `analysed`: K.
+/// Throws Error if a pivot is zero.
 std::int64_t modes_below(const Factor& analysed, const SparseMatrix& K, const SparseMatrix& M, double square);
 
-/// Whether the `omega`, ascending, are the lowest with none left out: counted in a gap as high up among them
-/// as there is one.
+/// True if the `omega`, ascending, are the lowest with none missing: counted in the highest gap among them.
 bool none_left_out(const Factor& analysed, const SparseMatrix& K, const SparseMatrix& M,
                    const std::vector<double>& omega);
 

@@ -47,7 +47,7 @@ struct MeshGeometry {
   const ProgressText& progress;
   std::vector<std::string>& notes;
   MeshGroups& groups;
-  bool keep;  ///< files that are there
+  bool keep;  ///< keep existing files
 
   [[nodiscard]] const char* mesher() const { return options.mesher == Mesher::cgal ? "CGAL" : "TetGen"; }
 
@@ -65,7 +65,8 @@ struct MeshGeometry {
     return mesh_surface(triangles, options, where);
   }
 
-  /// False where CGAL's mesher is to make boundary and inside in one, as remeshing spoils the surface.
+  /// Remeshes the surface. False if CGAL's mesher is to mesh boundary and inside at once, because remeshing
+  /// spoils the surface.
   [[nodiscard]] bool remesh(const std::filesystem::path& file, TriangleSurface& triangles) const {
     progress("remeshing the surface");
     Remeshing remeshed = remesh_surface(file, triangles, *options.edge_length);
@@ -88,7 +89,8 @@ struct MeshGeometry {
     return false;
   }
 
-  /// Tells what stays empty, which CGAL's mesher could miss: it finds what it happens to hit.
+  /// Reports cavities. Throws Error for CGAL's mesher, which could miss them: it finds only what it happens
+  /// to hit.
   void note_cavities(const TriangleSurface& triangles) const {
     const std::vector<TriangleSurface> cavities = cavities_of(triangles);
     if (cavities.empty()) return;
@@ -103,7 +105,7 @@ struct MeshGeometry {
                   R"(set mesher = "tetgen" in [mesh], or remove the inner shells from the surface)");
   }
 
-  /// Tells whom an edge_length does not do what it seems to.
+  /// Reports that an edge_length does not apply to the kept boundary.
   void note_kept_boundary(const TriangleSurface& triangles) const {
     if (!options.edge_length || options.remesh) {
       return;
@@ -141,7 +143,7 @@ struct MeshGeometry {
     return mesh_picture(picture, options, notes);
   }
 
-  /// Says so, and throws Error where there is no memory for so many cells.
+  /// Reports the generation, and throws Error if there is no memory for so many cells.
   void begin_generating(ElementType usual, double cells) const {
     progress("generating the mesh");
     const ElementType element = options.element.value_or(usual);
@@ -183,7 +185,8 @@ std::filesystem::path geometry_file(const Geometry& geometry) {
       geometry);
 }
 
-/// Only a volume file can disagree: the dimension of the others is known from their kind.
+/// Throws Error if the mesh and model.toml differ in dimension, which only a volume file can cause: the
+/// dimension of other geometries follows from their kind.
 void check_dimension(const Mesh& mesh, const Description& description, const std::string& where) {
   const std::string element = traits(mesh.element).name;
   if (mesh.dimension() == 2 && description.analysis == Analysis::solid) {
@@ -218,7 +221,7 @@ void for_node_lists(const Description& description, const Work& work) {
   if (description.warp && description.warp->where) note("[warp]", *description.warp->where);
 }
 
-/// Tells of lists of nodes that select middles of edges too.
+/// Reports lists of nodes that also select middles of edges.
 void note_middles(const Description& description, MeshedBody& body) {
   for_node_lists(description, [&](const std::string& entry, const SelectNodes& listed) {
     const std::size_t middles = middles_between(body.mesh, listed.nodes).size();
@@ -229,7 +232,7 @@ void note_middles(const Description& description, MeshedBody& body) {
   });
 }
 
-/// -1 where there are no lists of nodes.
+/// Largest number in lists of nodes; -1 if there are no lists.
 Index largest_listed_node(const Description& description) {
   Index largest = -1;
   for_node_lists(description, [&](const std::string&, const SelectNodes& listed) {
@@ -238,14 +241,14 @@ Index largest_listed_node(const Description& description) {
   return largest;
 }
 
-/// The number of the first node of no element; of all nodes where there is none.
+/// Number of the first node without an element; the number of nodes if there is none.
 Index first_unused_node(const Mesh& mesh) {
   std::vector<std::uint8_t> used(mesh.nodes.size(), 0);
   for (const Index node : mesh.connectivity) used[static_cast<std::size_t>(node)] = 1;
   return static_cast<Index>(std::ranges::find(used, 0) - used.begin());
 }
 
-/// All groups that elements are in, with their names: "1 (liver), 2".
+/// All groups of the elements, with their names: "1 (liver), 2".
 std::string region_list(const MeshGroups& groups, const Mesh& mesh) {
   std::set<Index> present(mesh.regions.begin(), mesh.regions.end());
   for (const auto& [element, region] : groups.more) present.insert(region);
@@ -258,9 +261,9 @@ std::string region_list(const MeshGroups& groups, const Mesh& mesh) {
   return text + (groups.hint.empty() ? "" : "; " + groups.hint);
 }
 
-/// The materials with numbers for names of regions. Of the groups that an element is in, its region becomes
-/// the one that a material asks for. Throws Error for regions that are not there, and for an element that two
-/// materials ask for.
+/// The materials with numbers for names of regions. The region of an element in several groups becomes the
+/// one that a material uses. Throws Error for regions that do not exist, and for an element that two
+/// materials claim.
 std::vector<MaterialPart> in_numbers(std::vector<MaterialPart> parts, const MeshGroups& groups, Mesh& mesh,
                                      const std::string& toml) {
   std::map<Index, std::size_t> part_of;  // a region
@@ -308,7 +311,7 @@ constexpr double most_held = 1.0 / 3.0;  // of the nodes
 constexpr double most_across = 0.9;      // of the elements that reach from surface to surface
 constexpr double least_shape = 0.01;     // of an element
 
-/// What makes a body feel unlike the one that was meant, most often by mistake.
+/// Reports conditions, mostly mistakes, that make a body feel different from the intended one.
 std::vector<std::string> doubts_of(const MeshedBody& body) {
   std::vector<std::string> doubts;
   const Mesh& mesh = body.mesh;

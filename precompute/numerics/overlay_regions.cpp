@@ -14,7 +14,7 @@
 namespace palpate {
 namespace {
 
-/// Makes the meshes of patches round one node each. For one thread.
+/// Makes the meshes of patches around one node each. For one thread.
 class PatchMeshes {
  public:
   PatchMeshes(const Model& model, const ElementsAtNodes& at, const OverlayRegions& overlay)

@@ -1,4 +1,4 @@
-// Results on their way from the process that has them to others.
+// Results sent from the process that has them to others.
 #pragma once
 
 #include <cstring>
@@ -10,16 +10,16 @@
 
 namespace palpate {
 
-/// Values as bytes, put in or taken out in the same order by the same calls of `carry`: a parcel that is made
-/// of bytes gives, another one takes. Both ends have the same processor and program.
+/// Serialised values, written or read in the same order by the same calls of `carry`: a parcel constructed
+/// from bytes reads, another one writes. Both ends have the same processor and program.
 class Parcel {
  public:
-  Parcel() = default;  ///< takes
+  Parcel() = default;  ///< writes
   explicit Parcel(std::string_view bytes) : rest_(bytes), gives_(true) {}
 
-  [[nodiscard]] const std::string& bytes() const noexcept { return bytes_; }  ///< that were taken
+  [[nodiscard]] const std::string& bytes() const noexcept { return bytes_; }  ///< bytes written so far
   [[nodiscard]] bool gives() const noexcept { return gives_; }
-  [[nodiscard]] bool empty() const noexcept { return rest_.empty(); }  ///< has given all
+  [[nodiscard]] bool empty() const noexcept { return rest_.empty(); }  ///< true if all bytes are read
 
   template <class T>
   requires std::is_arithmetic_v<T>
@@ -34,12 +34,12 @@ class Parcel {
     carry_bytes(values.data(), count * sizeof(T));
   }
 
-  /// Values of a number that both ends know.
+  /// Carries values whose number both ends know.
   template <class T>
   requires std::is_arithmetic_v<T>
   void carry(std::span<T> values) { carry_bytes(values.data(), values.size_bytes()); }
 
-  /// One of Eigen's.
+  /// Carries an Eigen matrix.
   template <class Matrix>
   requires requires(Matrix& m) { m.resize(m.rows(), m.cols()); }
   void carry(Matrix& matrix) {

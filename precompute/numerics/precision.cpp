@@ -21,8 +21,8 @@ using Refined = RefinedSolution::Refined;
 constexpr std::size_t softest_places = 4, random_places = 4;
 constexpr std::array<std::size_t, 4> touched_nodes = {1, 2, 5, 30};
 constexpr Eigen::Index columns_at_once = 24;
-constexpr double fine_reference = 1e-8;  // error of forces that plain solves may have as the reference
-constexpr double safety = 4.0;           // of what the tick adds, as in assemble_contact
+constexpr double fine_reference = 1e-8;  // force error of plain solves that is acceptable for the reference
+constexpr double safety = 4.0;           // factor of the tick's addition, as in assemble_contact
 
 /// Stored nodes of the surface that are free along every axis, in the order of their mesh nodes.
 std::vector<Index> free_surface_nodes(const Model& model) {
@@ -44,7 +44,7 @@ const Vec3& position(const Model& model, Index stored) {
   return model.mesh.nodes[static_cast<std::size_t>(model.stored_nodes[static_cast<std::size_t>(stored)])];
 }
 
-/// The nodes nearest to `node`, itself first.
+/// Nodes nearest to `node`, itself first.
 std::vector<Index> nearest(const Model& model, const std::vector<Index>& nodes, Index node) {
   std::vector<std::pair<double, Index>> by_distance;
   by_distance.reserve(nodes.size());
@@ -58,7 +58,7 @@ std::vector<Index> nearest(const Model& model, const std::vector<Index>& nodes, 
   return result;
 }
 
-/// How much a unit displacement of one node could be lost in what many have in common: K's diagonal times the
+/// Loss of a unit displacement of one node in the common part of many nodes: K's diagonal times the
 /// compliance of the smooth part.
 double amplification(const Model& model, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
                      const SmoothPart& smooth, Index node) {
@@ -71,7 +71,7 @@ double amplification(const Model& model, const SparseMatrix& K, std::span<const 
   return most;
 }
 
-/// The nodes of each place.
+/// Nodes of each place.
 std::vector<std::vector<Index>> choose_places(const Model& model, const SparseMatrix& K,
                                               std::span<const std::int64_t> stored_dofs,
                                               const SmoothPart& smooth) {
@@ -95,7 +95,7 @@ std::vector<std::vector<Index>> choose_places(const Model& model, const SparseMa
   return places;
 }
 
-/// What plain solves may make of a touch's forces: their error, of the columns of the place's first node,
+/// Estimated force error of a touch by plain solves: their error in the columns of the place's first node
 /// times K's diagonal.
 double reference_error(const Model& model, const Factor& factor, const SparseMatrix& K,
                        std::span<const std::int64_t> stored_dofs, const TouchedPlace& place) {
@@ -112,7 +112,7 @@ double reference_error(const Model& model, const Factor& factor, const SparseMat
   return worst;
 }
 
-/// C of the place's dofs.
+/// Computes C of the place's dofs.
 void solve_place(const Factor& factor, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
                  bool refine, TouchedPlace& place) {
   const auto size = static_cast<Eigen::Index>(place.dofs.size());
@@ -131,7 +131,7 @@ void solve_place(const Factor& factor, const SparseMatrix& K, std::span<const st
       place.reference.row(i).segment(first, count) = x.refined.row(of_K(i));
     }
   }
-  // As a packed matrix: an entry and its mirror image are one number, from the column that comes first.
+  // As in a packed matrix, an entry and its mirror image are one number, from the earlier column.
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < size; ++j)
       if (place.dofs[static_cast<std::size_t>(j)] < place.dofs[static_cast<std::size_t>(i)])

@@ -8,7 +8,7 @@ namespace {
 using Refined = RefinedSolution::Refined;
 
 constexpr int most_steps = 6;
-constexpr long double fine = 1e-18L;  // relative error that is left
+constexpr long double fine = 1e-18L;  // remaining relative error
 
 Eigen::MatrixXd solve(const Factor& factor, const Eigen::MatrixXd& b) {
   const std::vector<double> x = factor.solve({b.data(), static_cast<std::size_t>(b.size())}, b.cols());
@@ -33,7 +33,7 @@ Eigen::MatrixXd residual(const SparseMatrix& K, const Eigen::MatrixXd& b, const 
   return r.cast<double>();
 }
 
-/// Adds to x what `solve` gives of its residual, as long as that becomes less.
+/// Adds corrections by `solve` from the residual of x as long as they decrease.
 template <class Solve, class Residual>
 void refine(Refined& x, const Solve& solve, const Residual& residual_of) {
   const long double largest = x.cwiseAbs().maxCoeff();
@@ -41,9 +41,9 @@ void refine(Refined& x, const Solve& solve, const Residual& residual_of) {
   for (int step = 0; step < most_steps; ++step) {
     const Eigen::MatrixXd change = solve(residual_of(x));
     const long double size = change.cwiseAbs().maxCoeff();
-    if (!(size < before)) break;  // nothing more is to be had
+    if (!(size < before)) break;  // no further improvement
     x += change.cast<long double>();
-    if (size * size <= fine * before * largest) break;  // the next change would be as much smaller again
+    if (size * size <= fine * before * largest) break;  // the next change would be smaller by the same factor
     before = size;
   }
 }

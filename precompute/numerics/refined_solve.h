@@ -1,5 +1,4 @@
-// Solves that are right beyond what double precision gives: the reference that stored numbers are held
-// against.
+// Solves more accurate than double precision, as reference for stored numbers.
 #pragma once
 
 #include <Eigen/Dense>
@@ -8,12 +7,12 @@
 
 namespace palpate {
 
-/// x = K^-1 b by the factor alone, and refined.
+/// x = K^-1 b, by the factor alone and refined.
 struct RefinedSolution {
   using Refined = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-  Eigen::MatrixXd plain;  ///< [n, columns] as Factor::solve gives it
+  Eigen::MatrixXd plain;  ///< [n, columns] by Factor::solve
   Refined refined;        ///< [n, columns] with residuals in extended precision: its error does not depend on
-                          ///< the condition of K as long as that is below some 1e15
+                          ///< the condition of K up to about 1e15
 };
 
 /// Solves for the columns of b [n, columns]. `factor`: of K, computed; K: the lower triangle.
@@ -23,7 +22,7 @@ RefinedSolution solve_refined(const Factor& factor, const SparseMatrix& K, const
 RefinedSolution::Refined solve_refined(const Eigen::LLT<Eigen::MatrixXd>& factor,
                                        const RefinedSolution::Refined& A, const Eigen::MatrixXd& b);
 
-/// Without refinement: both by the factor alone.
+/// Solves without refinement: both members by the factor alone.
 RefinedSolution solve_plain(const Factor& factor, const Eigen::MatrixXd& b);
 
 }  // namespace palpate

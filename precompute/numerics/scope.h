@@ -1,4 +1,4 @@
-// Which dofs' rows and columns of Xi are kept.
+// Dofs whose rows and columns of Xi are stored.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// A mark for each dof of K: 1 where its row and column of Xi are kept (theory.md section 2).
+/// Marks of the dofs of K: 1 if row and column of Xi are stored (theory.md section 2).
 std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Surface& surface,
                                            const Stiffness& stiffness, Scope scope, Index layers);
 

@@ -1,4 +1,4 @@
-// Work whose results all need who share it: threads, or processes and their threads.
+// Work divided among threads, or processes and their threads, all of which need the results.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,13 @@ namespace palpate {
 /// Items that do not depend on each other.
 struct SharedItems {
   std::int64_t count = 0;
-  std::function<void(std::int64_t item, int worker)> work;        ///< by any thread of any process
-  std::function<void(std::int64_t item, Parcel& results)> carry;  ///< between who worked and all others
-  std::function<bool(double share)> done = [](double) { return true; };  ///< (0..1); false stops
+  std::function<void(std::int64_t item, int worker)> work;        ///< called by any thread of any process
+  std::function<void(std::int64_t item, Parcel& results)> carry;  ///< sends results to all other processes
+  std::function<bool(double share)> done = [](double) { return true; };  ///< gets the finished fraction
+                                                                         ///< (0..1); false stops
 };
 
-/// Who shares work. All processes make the same calls in the same order.
+/// Executor of divided work. All processes make the same calls in the same order.
 class Sharing {
  public:
   Sharing() = default;
@@ -26,15 +27,15 @@ class Sharing {
   Sharing(const Sharing&) = delete;
   Sharing& operator=(const Sharing&) = delete;
 
-  /// Threads of this process: `worker` is in [0, jobs).
+  /// Number of threads of this process: `worker` is in [0, jobs).
   [[nodiscard]] virtual int jobs() const = 0;
 
-  /// Works on each item once and returns when this process has the results of all, or false, in all
-  /// processes, when it was stopped. `done` is called by one process, for one item at a time.
+  /// Works on each item once and returns true when this process has the results of all, or false, in all
+  /// processes, if stopped. `done` is called by one process, for one item at a time.
   virtual bool for_each(const SharedItems& items) = 0;
 };
 
-/// Threads of this process alone: nothing is carried.
+/// Threads of this process alone; nothing is carried.
 class ThreadSharing : public Sharing {
  public:
   explicit ThreadSharing(int jobs) : jobs_(jobs) {}

@@ -11,11 +11,11 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-constexpr std::int64_t more_vectors = 8;  // that the iteration carries beside those wanted
+constexpr std::int64_t more_vectors = 8;  // extra vectors of the iteration
 constexpr int iterations = 2;
-constexpr double smallest = 1e-14;  // eigenvalue, relative, that is taken for more than rounding
+constexpr double smallest = 1e-14;  // relative eigenvalue that exceeds rounding
 
-/// X -> D^1/2 A D^1/2 X of the stored dofs that are free.
+/// X -> D^1/2 A D^1/2 X for the free stored dofs.
 class ScaledInverse {
  public:
   ScaledInverse(const Factor& factor, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs)
@@ -28,7 +28,7 @@ class ScaledInverse {
   }
 
   [[nodiscard]] Eigen::Index rows() const { return root_.size(); }
-  [[nodiscard]] const Eigen::VectorXd& root() const { return root_; }  // of D
+  [[nodiscard]] const Eigen::VectorXd& root() const { return root_; }  // root of D
 
   [[nodiscard]] Matrix operator*(const Matrix& X) const {
     Matrix b = Matrix::Zero(factor_.order(), X.cols());

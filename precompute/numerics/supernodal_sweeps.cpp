@@ -48,7 +48,7 @@ std::span<const std::int64_t> SupernodalSweeps::rows(const Supernode& s) const n
 void SupernodalSweeps::prepare(Workspace& workspace, std::int64_t width) const {
   const auto fit = [width](std::vector<double>& values, std::int64_t rows) {
     const auto size = static_cast<std::size_t>(rows * width);
-    if (size > values.capacity()) values = {};  // not two of them at a time
+    if (size > values.capacity()) values = {};  // frees the old array first
     values.resize(size);
   };
   fit(workspace.X, factor_.order());
@@ -99,7 +99,7 @@ void SupernodalSweeps::backward(const Supernode& s, bool on_path, std::int64_t a
   if (s.below > 0) {
     cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, blas(active), blas(s.columns), blas(s.below), -1.0,
                 below, blas(active), L + s.columns, blas(ld), on_path ? 1.0 : 0.0, X, blas(width));
-  } else if (!on_path) {  // the root of another part of the body: clamped nodes can cut K in two
+  } else if (!on_path) {  // the root of another part of the body: held nodes can split K in two
     std::fill_n(X, s.columns * width, 0.0);
   }
   cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(active),

@@ -1,4 +1,4 @@
-// The steps of forward and backward substitution, a supernode at a time.
+// Forward and backward substitution, one supernode at a time.
 #pragma once
 
 #include <cblas.h>
@@ -11,12 +11,12 @@
 
 namespace palpate {
 
-/// A size as BLAS takes it.
+/// A size in BLAS's integer type.
 inline blasint blas(std::int64_t size) {
   return static_cast<blasint>(size);
 }
 
-/// Block of columns of a supernodal factor that share their rows.
+/// Block of columns of a supernodal factor with the same rows.
 struct Supernode {
   std::int64_t first;    ///< position of its first column
   std::int64_t columns;  ///< number of columns
@@ -28,9 +28,9 @@ struct Supernode {
   [[nodiscard]] std::int64_t end() const noexcept { return first + columns; }
 };
 
-/// Substitution with right-hand sides that are contiguous a dof, so that gathering the rows of a supernode
-/// copies whole cache lines: X [n, width] row-major, row p is the dof at position p of the factor. Which
-/// supernodes a solve needs is the caller's to know. Const: any number of threads may sweep.
+/// Substitution with right-hand sides contiguous per dof, so that gathering the rows of a supernode copies
+/// whole cache lines: X [n, width] row-major, row p is the dof at position p of the factor. The caller
+/// selects the supernodes that a solve needs. Const: any number of threads may sweep.
 class SupernodalSweeps {
  public:
   /// Scratch of one thread.
@@ -40,12 +40,12 @@ class SupernodalSweeps {
     std::vector<std::uint8_t> on_path;  // [supernodes]
   };
 
-  /// `factor` may be only analysed as long as nothing is swept.
+  /// `factor` may be only analysed as long as no sweep is run.
   explicit SupernodalSweeps(const Factor& factor);
 
   [[nodiscard]] const Factor& factor() const noexcept { return factor_; }
   [[nodiscard]] std::span<const Supernode> supernodes() const noexcept { return supernodes_; }
-  /// Supernode that a position is in.
+  /// Supernode that contains a position.
   [[nodiscard]] std::int64_t supernode_of(std::int64_t position) const noexcept {
     return supernode_of_[static_cast<std::size_t>(position)];
   }
@@ -53,21 +53,21 @@ class SupernodalSweeps {
   /// Positions of a supernode's rows, its own columns first.
   [[nodiscard]] std::span<const std::int64_t> rows(const Supernode& s) const noexcept;
 
-  /// Room for so many right-hand sides.
+  /// Allocates memory for so many right-hand sides.
   void prepare(Workspace& workspace, std::int64_t width) const;
   [[nodiscard]] std::int64_t workspace_bytes(std::int64_t width) const;
 
   /// Marks [supernodes] the supernodes from a position to the root.
   void mark_path(std::int64_t position, std::vector<std::uint8_t>& marks) const;
 
-  /// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s, of the first `active` of `width` right-hand sides.
+  /// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s, for the first `active` of `width` right-hand sides.
   void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
 
-  /// X_s := L_ss^-T (X_s - L_bs^T X_below); X_s of a supernode that is not on the path counts as zero.
+  /// X_s := L_ss^-T (X_s - L_bs^T X_below); X_s counts as zero if the supernode is not on the path.
   void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
                 Workspace& workspace) const;
 
-  /// B [n, width], column-major, of the dofs of K, becomes K^-1 B. Room is made.
+  /// Replaces B [n, width], column-major, at the dofs of K, by K^-1 B. Allocates the workspace.
   void solve(double* B, std::int64_t width, Workspace& workspace) const;
 
  private:

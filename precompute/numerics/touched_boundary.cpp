@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// Normal of a line in the plane or of a triangle, as long as its measure.
+/// Normal of a line in the plane or of a triangle; its length is the measure.
 Vec3 measure_normal(const Model& model, std::span<const Index> nodes) {
   const auto x = [&](std::size_t i) -> const Vec3& {
     return model.mesh.nodes[static_cast<std::size_t>(nodes[i])];
@@ -19,13 +19,14 @@ Vec3 measure_normal(const Model& model, std::span<const Index> nodes) {
   return edge.cross(x(2) - x(0)) / 2.0;
 }
 
-/// Barycentric coordinates of the point of a line that is nearest to p.
+/// Barycentric coordinates of the point on a line nearest to p.
 Vec3 nearest_on_line(const Vec3& a, const Vec3& b, const Vec3& p) {
   const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
   return {1.0 - t, t, 0.0};
 }
 
-/// Nearest point of a triangle: inside by projection, else on the nearest side.
+/// Barycentric coordinates of the point on a triangle nearest to p: inside by projection, else on the nearest
+/// side.
 Vec3 nearest_on_triangle(const std::array<Vec3, 3>& x, const Vec3& p) {
   const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]);
   const double area = normal.squaredNorm();

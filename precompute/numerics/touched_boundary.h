@@ -1,4 +1,4 @@
-// A baked model's boundary as a finger tip feels it: for comparing files, not for the tick.
+// Boundary of a baked model as a finger tip feels it: for comparing files, not for the tick.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// Share of a force on each of some stored nodes; what is missing to 1 is on fixed nodes, which do not move.
+/// Fraction of a force on each of some stored nodes; the rest to 1 is on fixed nodes, which do not move.
 struct Tip {
   std::vector<Index> stored;
   std::vector<double> share;
@@ -25,22 +25,22 @@ class TouchedBoundary {
   }
   [[nodiscard]] double mean_edge() const noexcept { return mean_edge_; }
 
-  /// The nodes under a tip of that radius with shares of 1 - (r/R)^2 times their part of the boundary; the
-  /// nearest node alone when no other is under it.
+  /// Nodes under a tip of that radius with fractions of 1 - (r/R)^2 times their part of the boundary; the
+  /// nearest node alone if no other is under it.
   [[nodiscard]] Tip tip(const Vec3& place, double radius) const;
 
   /// Mean displacement under the tip along `direction` by a unit force on it in that direction [m/N].
   [[nodiscard]] double compliance(const Tip& tip, const Vec3& direction) const;
 
-  /// Where a point is on the boundary.
+  /// Position on the boundary.
   struct Place {
     std::size_t simplex;
     Vec3 weights;     // barycentric
-    double distance;  // of the point from it [m]
+    double distance;  // of the point from the boundary [m]
   };
   [[nodiscard]] Place nearest(const Vec3& point) const;
 
-  /// Displacement there by a unit force on the tip along `direction` [m/N]; held nodes do not move.
+  /// Displacement at a place by a unit force on the tip along `direction` [m/N]; held nodes do not move.
   [[nodiscard]] Vec3 displacement(const Place& at, const Tip& tip, const Vec3& direction) const;
 
  private:
@@ -51,7 +51,7 @@ class TouchedBoundary {
   std::vector<Index> stored_of_node_;
   std::vector<Index> free_nodes_;
   std::vector<Vec3> normals_;  // [N] outward, of length 1; zero inside
-  std::vector<double> areas_;  // [N] part of the boundary that belongs to each node [m^2], in the plane [m]
+  std::vector<double> areas_;  // [N] part of the boundary for each node [m^2], in the plane [m]
   double mean_edge_ = 0.0;
 };
 

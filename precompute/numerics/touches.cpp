@@ -13,7 +13,7 @@ using Refined = RefinedSolution::Refined;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// The largest force on a node.
+/// Largest force on a node.
 template <class Forces>
 double largest_force(const Forces& f, int d) {
   double largest = 0.0;

@@ -1,4 +1,4 @@
-// A surface as CGAL has it.
+// Surfaces in CGAL's data structures.
 #pragma once
 
 #include <CGAL/Surface_mesh.h>

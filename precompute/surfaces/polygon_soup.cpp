@@ -19,7 +19,8 @@ using Point = PolygonSoup::Point;
 using Kernel = PolygonSoup::Kernel;
 using Polygon = PolygonSoup::Polygon;
 
-/// Drops corners that follow on themselves, and then polygons of less than three. Returns how many.
+/// Drops repeated consecutive corners, and then polygons of less than three. Returns the number of polygons
+/// dropped.
 std::size_t collapse(PolygonSoup& soup) {
   for (Polygon& polygon : soup.polygons) {
     polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
@@ -28,8 +29,7 @@ std::size_t collapse(PolygonSoup& soup) {
   return std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
 }
 
-/// Points of edges that one polygon alone has, each as often as it is in one; how many such edges there are
-/// is half.
+/// Ends of all edges that only one polygon has, twice as many as there are such edges.
 std::vector<std::size_t> open_points(const PolygonSoup& soup) {
   const std::vector<SoupEdge> edges = sorted_edges(soup);
   std::vector<std::size_t> points;
@@ -41,7 +41,7 @@ std::vector<std::size_t> open_points(const PolygonSoup& soup) {
   return points;
 }
 
-/// Joins those of `points` that are within `distance`, directly or by others between. False where there are
+/// Joins those of `points` that are within `distance`, directly or through others. Returns false if there are
 /// none.
 bool join(PolygonSoup& soup, std::vector<std::size_t> points, double distance) {
   const Kernel::Vector_3 across(0.61, 0.53, 0.59);  // along no grid or face that a program makes

@@ -24,7 +24,7 @@ std::size_t at(Index i) {
   return static_cast<std::size_t>(i);
 }
 
-/// What is in a closed shell.
+/// Inside of a closed shell.
 class Inside {
  public:
   explicit Inside(const TriangleSurface& shell) : mesh_(mesh_of(shell)), closed_(CGAL::is_closed(mesh_)) {
@@ -127,7 +127,7 @@ Vec3 point_inside(const TriangleSurface& shell) {
     sides << corner(*t, 1) - corner(*t, 0), corner(*t, 2) - corner(*t, 0), -inwards;
     const Eigen::FullPivLU<Eigen::Matrix3d> lu(sides);
     if (!lu.isInvertible()) continue;
-    const Vec3 hit = lu.solve(from - corner(*t, 0));  // two shares and the way
+    const Vec3 hit = lu.solve(from - corner(*t, 0));  // two barycentric coordinates and the distance
     if (hit[0] >= -beyond && hit[1] >= -beyond && hit[0] + hit[1] <= 1.0 + beyond && hit[2] > 0.0)
       nearest = std::min(nearest, hit[2]);
   }

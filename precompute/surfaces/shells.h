@@ -1,4 +1,4 @@
-// Shells: the parts of a surface that are apart. One is around the body, others around its cavities.
+// Shells: the disconnected parts of a surface. One encloses the body, others its cavities.
 #pragma once
 
 #include <functional>
@@ -8,35 +8,35 @@
 
 namespace palpate {
 
-/// Volume / area^1.5 that something encloses at least: 0.094 of a ball, 7e-4 of a pipe's wall of 1 : 400.
+/// Smallest volume / area^1.5 of a surface that encloses a body: a ball has 0.094, a pipe with a wall of 1 :
+/// 400 has 7e-4.
 inline constexpr double least_filling = 1e-5;
 
-/// The parts of a surface that share no node, in the order of their first triangles.
+/// Parts of a surface that have no node in common, in the order of their first triangles.
 std::vector<TriangleSurface> shells_of(const TriangleSurface& surface);
 
 /// Shells as one surface, in their order.
 TriangleSurface together(const std::vector<TriangleSurface>& shells);
 
-/// Turns a closed shell outwards, or inwards as that of a cavity. Returns whether it was not so.
+/// Orients a closed shell outwards, or inwards as that of a cavity. Returns true if that changed it.
 bool turn(TriangleSurface& shell, bool outwards);
 
-/// Those shells of a surface of several that are turned inwards: what they enclose is empty.
+/// Shells of a surface, if it has several, that are oriented inwards: their inside is empty.
 std::vector<TriangleSurface> cavities_of(const TriangleSurface& surface);
 
-/// A point in a closed shell.
+/// A point inside a closed shell.
 Vec3 point_inside(const TriangleSurface& shell);
 
-/// A surface as a body and what does not belong to it.
+/// The shells of a body, and shells that do not belong to it.
 struct BodyShells {
-  std::vector<TriangleSurface> kept;  ///< first the outer shell, then those of cavities
-  std::vector<TriangleSurface>
-      others;           ///< beside the body, inside of a cavity, or open or flat inside the body
-  bool turned = false;  ///< the outer shell was inside out
+  std::vector<TriangleSurface> kept;    ///< first the outer shell, then those of cavities
+  std::vector<TriangleSurface> others;  ///< beside the body, inside a cavity, or open or flat inside the body
+  bool turned = false;                  ///< the outer shell was inside out
 };
 
-/// Finds the outer shell, that with the largest area or the largest closed one around it, mends it by `mend`,
-/// and finds its cavities: the closed shells in it that are not in another of them. Turns closed ones as they
-/// have to be.
+/// Finds the outer shell (the one with the largest area, or the largest closed one around it), repairs it by
+/// `mend`, and finds its cavities: the closed shells in it that are not inside another of them. Orients
+/// closed shells correctly.
 BodyShells body_shells(
     std::vector<TriangleSurface> shells, const std::function<TriangleSurface(TriangleSurface)>& mend =
                                              [](TriangleSurface shell) { return shell; });

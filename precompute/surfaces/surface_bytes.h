@@ -1,4 +1,4 @@
-// Surfaces on their way from a child process.
+// Surfaces sent by a child process.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ inline void append_surface(Bytes& bytes, const TriangleSurface& surface) {
   append_array(bytes, std::span(surface.triangles));
 }
 
-/// Takes a surface from the front of `bytes`. Throws Error where they do not hold one.
+/// Takes a surface from the front of `bytes`. Throws Error if they do not hold one.
 inline TriangleSurface take_surface(std::span<const std::byte>& bytes) {
   TriangleSurface surface;
   surface.nodes = take_array<Vec3>(bytes);
@@ -32,7 +32,7 @@ inline std::string take_text(std::span<const std::byte>& bytes) {
   return {text.begin(), text.end()};
 }
 
-/// Appends texts with their number, for take_lines.
+/// Appends lines with their number, for take_lines.
 inline void append_lines(Bytes& bytes, const std::vector<std::string>& lines) {
   const std::size_t count = lines.size();
   append_array(bytes, std::span(&count, 1));

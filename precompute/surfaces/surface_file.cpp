@@ -37,7 +37,7 @@ void add_point(PolygonSoup& soup, const Vec3& x) {
   soup.points.emplace_back(x[0], x[1], x[2]);
 }
 
-/// What can be wrong whatever the format.
+/// Checks that apply to any format.
 void check_soup(const PolygonSoup& soup, const std::string& where) {
   for (const PolygonSoup::Point& p : soup.points) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -60,7 +60,7 @@ void check_soup(const PolygonSoup& soup, const std::string& where) {
                 "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
 }
 
-/// The word before the first of OFF's numbers, if there is one, has letters for what follows each point.
+/// Reads OFF. A word before the first number has letters for the data that follow each point.
 void read_off(TextReader& in, PolygonSoup& soup) {
   const std::string head(in.peek());
   if (const std::size_t off = in_small_letters(head).find("off"); off != std::string::npos) {
@@ -71,7 +71,7 @@ void read_off(TextReader& in, PolygonSoup& soup) {
       in.fail("the file is a binary OFF; only text is read", "save it as text, or as STL or PLY");
   }
   const std::int64_t points = in.count("the number of points", 3), faces = in.count("the number of faces", 4);
-  in.rest_of_line();  // the number of edges, which some leave out
+  in.rest_of_line();  // the number of edges, which some files omit
   for (std::int64_t i = 0; i < points; ++i) {
     add_point(soup, in.point());
     in.rest_of_line();
@@ -127,7 +127,7 @@ void read_obj(TextReader& in, PolygonSoup& soup) {
   }
 }
 
-/// Words that are no part of a facet are names and normals.
+/// Reads ASCII STL; words outside facets are names and normals.
 void read_ascii_stl(TextReader& in, PolygonSoup& soup) {
   Polygon corners;
   bool ended = false;
@@ -179,7 +179,7 @@ void read_binary_stl(const std::string& bytes, const std::string& where, Polygon
   }
 }
 
-/// A type of PLY.
+/// A type of numbers in PLY.
 struct PlyType {
   std::array<std::string_view, 2> names;
   std::size_t bytes;
@@ -209,7 +209,7 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
 };
 
-/// A PLY file: its header's elements in their order, and then their values.
+/// Reader of a PLY file: the header's elements in order, and then their values.
 class PlyReader {
  public:
   PlyReader(const std::string& bytes, const std::filesystem::path& file)
@@ -270,8 +270,8 @@ class PlyReader {
     find_body();
   }
 
-  /// Values begin behind the first line that is end_header. Where lines end with \r alone, a body may begin
-  /// with \n.
+  /// Finds the values, which begin after the first line that is end_header. If lines end with \r alone, a
+  /// body may begin with \n.
   void find_body() {
     constexpr std::string_view mark = "end_header";
     const auto is_end = [](char c) { return c == '\n' || c == '\r'; };
@@ -302,7 +302,7 @@ class PlyReader {
       take(type);
   }
 
-  /// A value that must be a whole number.
+  /// Reads a value that must be a whole number.
   std::int64_t integer(const PlyType& type) {
     constexpr double largest = 9e15;  // below 2^53: exact
     const double number = value(type);
@@ -343,7 +343,7 @@ class PlyReader {
     if (element_->name == "tristrips") add_strips(list, soup);
   }
 
-  /// Strips of triangles, every other of which is turned; -1 ends a strip.
+  /// Adds strips of triangles, every other one of which is reversed; -1 ends a strip.
   static void add_strips(const std::vector<std::size_t>& list, PolygonSoup& soup) {
     constexpr auto end = static_cast<std::size_t>(-1);
     std::size_t begin = 0;
@@ -361,13 +361,13 @@ class PlyReader {
   std::size_t position_ = 0;
   std::string format_;
   std::vector<PlyElement> elements_;
-  const PlyElement* element_ = nullptr;  // that is read
+  const PlyElement* element_ = nullptr;  // being read
   std::int64_t number_ = 0;              // of it
 };
 
 void read_by_name(const std::string& bytes, const std::filesystem::path& file, PolygonSoup& soup) {
   const std::string extension = in_small_letters(file.extension().string());
-  // The number of a binary STL's facets has an empty byte, which text has not.
+  // The facet count of a binary STL has a zero byte, which text has not.
   if (extension == ".stl" && bytes.size() >= 84 && bytes.find('\0', 80) < 84)
     return read_binary_stl(bytes, file.string(), soup);
   if (extension == ".ply") return PlyReader(bytes, file).read(soup);

@@ -1,4 +1,4 @@
-// The formats of surfaces: OFF, OBJ, STL and PLY.
+// Reader of the surface formats OFF, OBJ, STL and PLY.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +8,9 @@
 
 namespace palpate {
 
-/// Reads the bytes of an OFF, OBJ, STL (ASCII and binary) or PLY file, by its extension. What the file has
-/// beside points and polygons is skipped. Throws Error with the line, or in binary files the number of the
-/// polygon, where something is not what it should be. Takes memory only for what it has read.
+/// Reads the bytes of an OFF, OBJ, STL (ASCII and binary) or PLY file, by its extension. Skips everything
+/// except points and polygons. Throws Error with the line, or in binary files the number of the polygon, for
+/// invalid contents. Allocates memory only for data that it has read.
 PolygonSoup read_polygon_soup(const std::string& bytes, const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -43,9 +43,9 @@ using Face = SurfaceMesh::Face_index;
 
 constexpr double sharp_edge_degrees = 60.0;
 constexpr int remesh_iterations = 5;
-constexpr double remesh_time = 1e-3;    // [s] for a triangle, meant to be far too much
-constexpr double remesh_memory = 4e3;   // [byte] for a triangle, likewise
-constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
+constexpr double remesh_time = 1e-3;    // [s] per triangle, meant to be far too much
+constexpr double remesh_memory = 4e3;   // [byte] per triangle, likewise
+constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has about 1e5 at most
 
 /// Number of connected groups of open edges.
 std::size_t count_holes(const std::vector<SoupEdge>& open_edges, std::size_t points) {
@@ -91,7 +91,7 @@ void check_edges(const PolygonSoup& soup, const std::string& where) {
               where, "close the holes in a mesh editor (\"fill holes\")");
 }
 
-/// Orients all polygons alike.
+/// Orients all polygons consistently.
 SurfaceMesh connect(PolygonSoup& soup, const std::string& where, std::vector<std::string>& notes) {
   const std::size_t points = soup.points.size();
   const std::vector<Polygon> as_given = soup.polygons;
@@ -128,8 +128,7 @@ void check_triangles(const SurfaceMesh& mesh, const std::string& where) {
   }
 }
 
-/// Turns the surface of a body outwards, and those of its cavities inwards. Throws where something else is
-/// there.
+/// Orients the surface of a body outwards, and those of its cavities inwards. Throws Error for anything else.
 void orient_outwards(SurfaceMesh& mesh, const std::string& where, std::vector<std::string>& notes) {
   std::vector<TriangleSurface> shells = shells_of(surface_of(mesh));
   bool turned = false;
@@ -175,7 +174,8 @@ std::vector<Corners> corners_of(const SurfaceMesh& mesh, const std::vector<FaceP
   return result;
 }
 
-/// Nothing where they may not or cannot be written: the mistake is told all the same.
+/// Writes the triangles; returns an empty path if that is not allowed or fails, since the defect is reported
+/// all the same.
 std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem, bool keep) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
@@ -205,7 +205,7 @@ Point center(const SurfaceMesh& mesh, Face face) {
                         mesh.point(mesh.target(mesh.next(h))));
 }
 
-/// Where and how often a surface goes through itself.
+/// Places and number of self-intersections.
 struct SelfIntersections {
   std::string problem;  // empty: nowhere
   std::vector<Corners> triangles;
@@ -232,7 +232,7 @@ void remesh(SurfaceMesh& mesh, double edge_length) {
   mesh.collect_garbage();
 }
 
-/// What a child sends.
+/// Data that a child sends.
 struct Answer {
   TriangleSurface surface;
   std::vector<std::string> notes;
@@ -257,7 +257,7 @@ Answer unpack(std::span<const std::byte> bytes) {
   return answer;
 }
 
-/// The surface of a file, whole and turned outwards; it may still intersect itself.
+/// Surface of a file, closed and oriented outwards; it may still intersect itself.
 SurfaceMesh read_mesh(const std::string& bytes, const std::filesystem::path& file,
                       std::vector<std::string>& notes) {
   const std::string where = file.string();

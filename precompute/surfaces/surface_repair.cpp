@@ -36,19 +36,19 @@ using SurfaceMesh = CGAL::Surface_mesh<PolygonSoup::Point>;
 using Face = SurfaceMesh::Face_index;
 using Halfedge = SurfaceMesh::Halfedge_index;
 
-constexpr std::size_t most_edges_without_delaunay = 300;  // CGAL takes the cube of that in time
-constexpr double most_change = 0.1;  // of the volume: replacing triangles where a surface intersects itself
+constexpr std::size_t most_edges_without_delaunay = 300;  // CGAL takes cubic time in them
+constexpr double most_change = 0.1;  // of the volume, by replacing triangles where a surface intersects
+                                     // itself
 constexpr double wrap_alpha = 0.5;   // of the edge
 constexpr std::size_t bytes_per_triangle = 100;  // of a file
-constexpr double least_share = 0.9;  // of area and volume: what is less of a file than that is not the body
+constexpr double least_share = 0.9;  // of area and volume: a smaller part of a file is not the body
 constexpr const char* inside_out = "the surface was inside out and was turned";
 
 std::string counted(std::size_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-/// Takes out what is no triangle and makes neighbours agree on what is outside; cuts where more than two
-/// polygons meet.
+/// Removes non-triangles, orients neighbours consistently, and cuts where more than two polygons meet.
 SurfaceMesh clean(PolygonSoup& soup, std::vector<std::string>& repairs) {
   const auto tell = [&](std::size_t count, const char* one, const char* many) {
     if (count != 0) repairs.push_back(counted(count, one, many));
@@ -84,7 +84,7 @@ SurfaceMesh clean(PolygonSoup& soup, std::vector<std::string>& repairs) {
   return mesh;
 }
 
-/// Edges around a hole, and how far it reaches.
+/// Edges around a hole, and its extent.
 struct Hole {
   std::size_t edges = 0;
   double extent = 0.0;
@@ -124,7 +124,7 @@ void fill_holes(SurfaceMesh& mesh, std::vector<std::string>& repairs) {
                                   largest.extent, largest.edges));
 }
 
-/// What a child sends: a surface, and what was done or is still wrong.
+/// Result from a child: a surface, and what was done or is still wrong.
 struct Mended {
   TriangleSurface surface;
   std::vector<std::string> repairs, remarks;
@@ -181,7 +181,7 @@ TriangleSurface body_of(std::vector<TriangleSurface> shells, SurfaceParts parts,
   return body;
 }
 
-/// Everything but self-intersections.
+/// Repairs everything except self-intersections.
 Mended mend(const std::string& bytes, const std::filesystem::path& file, SurfaceParts parts) {
   Mended answer;
   PolygonSoup soup = read_polygon_soup(bytes, file);
@@ -204,7 +204,7 @@ Mended mend(const std::string& bytes, const std::filesystem::path& file, Surface
   return answer;
 }
 
-/// `work` on a surface, in a child; nothing where the child fails.
+/// Runs `work` on a surface in a child; nullopt if the child fails.
 template <class Work>
 std::optional<Mended> attempt(const ChildTask& task, const Work& work) {
   try {
@@ -214,13 +214,13 @@ std::optional<Mended> attempt(const ChildTask& task, const Work& work) {
   }
 }
 
-/// Whether a surface encloses what another does, but for a little.
+/// True if two surfaces enclose nearly the same volume.
 bool is_about(const TriangleSurface& surface, const TriangleSurface& other) {
   const double volume = std::abs(enclosed_volume(other));
   return std::abs(std::abs(enclosed_volume(surface)) - volume) <= most_change * volume;
 }
 
-/// Throws where there is no body.
+/// Throws Error if there is no body.
 void check_filled(const TriangleSurface& surface, const std::string& where) {
   const double volume = std::abs(enclosed_volume(surface)), size = std::pow(area(surface), 1.5);
   if (volume < least_filling * size)
@@ -257,7 +257,7 @@ RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts p
       result.problem = problem_of(result.surface);
       return result;
     });
-    // CGAL cuts out as much as it needs, and may be left with a small part of the body.
+    // CGAL cuts out as much as it needs, and may leave only a small part of the body.
     if (untangled && untangled->problem.empty() && is_about(untangled->surface, answer.surface)) {
       answer.repairs.push_back("where it " + answer.problem + ", its triangles were replaced");
       answer.surface = std::move(untangled->surface);

@@ -18,7 +18,7 @@ struct TriangleSurface {
 /// Area of the triangles.
 double area(const TriangleSurface& surface);
 
-/// Volume inside, positive where the triangles are turned outwards.
+/// Volume inside, positive if the triangles are oriented outwards.
 double enclosed_volume(const TriangleSurface& surface);
 
 /// Mean length of the triangles' edges.

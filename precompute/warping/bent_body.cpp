@@ -67,7 +67,7 @@ void BentBody::make_warp() {
   const auto all_axes = static_cast<std::uint8_t>((1U << static_cast<unsigned>(dimension_)) - 1U);
   WarpSurface surface{
       .dimension = dimension_, .rest = {}, .simplices = surface_.simplices, .stored = {}, .held = {}};
-  std::vector<Index> place;  // in K, of the dofs of stored nodes; -1: held
+  std::vector<Index> place;  // dof in K of each dof of the stored nodes; -1: held
   Index stored = 0;
   for (std::size_t k = 0; k < surface_.mesh_nodes.size(); ++k) {
     const auto node = static_cast<std::size_t>(surface_.mesh_nodes[k]);

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr double end_share = 0.95;  // of the largest distance from what is held
+constexpr double end_share = 0.95;  // of the largest distance from held nodes
 constexpr double alike = 0.99;      // of the largest softness
 constexpr double same = 1e-6;       // of a softness: rounding and the mesh do not choose between axes
 
@@ -22,7 +22,7 @@ std::vector<Index> free_surface_nodes(const Model& model) {
   return nodes;
 }
 
-/// The part of them that is farthest from what is held.
+/// The nodes among them that are farthest from held ones.
 std::vector<Index> free_end(const Model& model, const std::vector<Index>& nodes) {
   std::vector<Vec3> held;
   for (std::size_t node = 0; node < model.fixed.size(); ++node) {

@@ -17,26 +17,26 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double none = std::numeric_limits<double>::infinity();
-constexpr double same_direction = 1e-5;  // the force no longer turns
+constexpr double same_direction = 1e-5;  // the force no longer rotates
 constexpr int most_turns = 60;
-constexpr double same_way = 1e-5;  // of how far the part has moved: the force is found
+constexpr double same_way = 1e-5;  // relative tolerance of the part's displacement
 constexpr int most_tries = 20;
-constexpr double near_enough = 1e-3;  // of the angle: the study is there
-constexpr double first_turn = 1e-3;   // [rad] at which the body is as soft as at rest
+constexpr double near_enough = 1e-3;  // relative tolerance of the final angle
+constexpr double first_turn = 1e-3;   // [rad] small enough for the stiffness at rest
 constexpr double most_growth = 2.0;   // of the force from level to level
-constexpr int most_halvings = 5;      // of a step of the force, where there is no balance
+constexpr int most_halvings = 5;      // of a step of the force, if there is no balance
 
-/// Where a law has the body under a force, none where it has no answer.
+/// Displacement by a law under a force; nullopt if it has no solution.
 using Law = std::function<std::optional<SurfaceDisplacement>(const Vec3& force)>;
 
-/// A law under a force that turns with the loaded part.
+/// A law under a force that rotates with the loaded part.
 class Followed {
  public:
   Followed(const BentBody& body, const Vec3& direction, Law law)
       : body_(body), first_(direction), direction_(direction), law_(std::move(law)) {}
 
-  /// The direction is a fixed point, found by Aitken's relaxation: far bent it turns by more than it is
-  /// given.
+  /// Displacement under the force. Its direction is a fixed point, found by Aitken's relaxation: when far
+  /// bent, the body rotates by more than the direction was changed.
   [[nodiscard]] std::optional<SurfaceDisplacement> under(double force) {
     const Vec3 start = direction_;
     Vec3 before = Vec3::Zero();
@@ -55,14 +55,14 @@ class Followed {
     return std::nullopt;
   }
 
-  /// How far the part has moved along the first direction [m]; none where there is no answer.
+  /// Displacement of the part along the first direction [m]; infinite if there is no solution.
   [[nodiscard]] double way(double force) {
     const std::optional<SurfaceDisplacement> u = under(force);
     return u ? first_.dot(body_.moved(*u)) : none;
   }
 
-  /// The force that moves the part by `way` [N], searched from `force`, which moves it by `there`; infinite
-  /// where none is found.
+  /// Force that moves the part by `way` [N], starting from `force`, which moves it by `there`; infinite if
+  /// none is found.
   [[nodiscard]] double force_for(double way, double force, double there) {
     double before = 0.0, way_before = 0.0;
     for (int k = 0; k < most_tries && std::isfinite(there); ++k) {
@@ -84,7 +84,7 @@ class Followed {
   Law law_;
 };
 
-/// What is asked of each level, and the study as it grows.
+/// Computation of the levels, and the study as it grows.
 class Bending {
  public:
   Bending(const Model& model, std::vector<Index> nodes, const std::optional<Vec3>& direction)
@@ -98,7 +98,7 @@ class Bending {
     study_.direction = direction_;
   }
 
-  /// Forces that grow until the surface has turned as far as is asked for.
+  /// Increases the force until the surface has rotated by the requested angle.
   std::optional<WarpStudyResult> run(const WarpOptions& options, const WarpStudyProgress& progress) {
     const double small = first_turn / body_.rotation(body_.linear(direction_));
     double softness = body_.rotation(body_.linear(small * direction_)) / small;  // [rad/N]

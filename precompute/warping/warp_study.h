@@ -1,4 +1,4 @@
-// How far off small strain and warping are where a body bends.
+// Errors of small strain and warping for a bent body.
 #pragma once
 
 #include <functional>
@@ -9,34 +9,33 @@
 
 namespace palpate {
 
-/// Told of the share (0..1) of a study that is done; false to stop it.
+/// Called with the finished fraction (0..1) of a study; returns false to stop it.
 using WarpStudyProgress = std::function<bool(double share)>;
 
-/// A study, and why it ended.
+/// A study, and the reason for its end.
 struct WarpStudyResult {
   WarpStudy study;
-  std::string note;  ///< why it ended before the angle that was asked for; empty: it did not
+  std::string note;  ///< reason for ending before the requested angle; empty: it reached it
 };
 
 /// Bends the body of `model` (without Green's functions: mesh, materials, held nodes, loads, rest) step by
-/// step by a force that turns with the part of the surface that it acts on, as a smooth tool's does, and
+/// step by a force that rotates with the part of the surface on which it acts, as a smooth tool's does, and
 /// compares small strain and warping with a corotational body at each step:
 ///
-/// - displacement: the distance between the mean displacements of that part under the same force, of the
-///   corotational one;
-/// - force: the force that moves the part as far along the first direction, less that of the corotational
-/// body, of
-///   it; infinite where no force does.
+/// - displacement: the distance between the mean displacements of that part under the same force, relative to
+/// the corotational one;
+/// - force: the difference of the forces that move the part equally far along the first direction, relative
+/// to the corotational one; infinite if there is no such force.
 ///
-/// Nothing where `progress` stops it. Throws Error where the body cannot be bent so.
+/// Nullopt if `progress` stops it. Throws Error if the body cannot be bent.
 std::optional<WarpStudyResult> study_warp(const Model& model, const WarpOptions& options,
                                           const WarpStudyProgress& progress);
 
-/// A stored study anew: its nodes, direction and forces, and what comes of them by the body of `model`. Where
-/// the body has no balance the levels end.
+/// Repeats a stored study: its nodes, direction and forces, with results for the body of `model`. Levels end
+/// where the body has no balance.
 WarpStudy repeat_warp_study(const Model& model);
 
-/// "forces within 5 % up to 19 degrees by small strain, 90 warped (studied to 90)".
+/// Result in words: "forces within 5 % up to 19 degrees by small strain, 90 warped (studied to 90)".
 std::string range_text(const WarpStudy& study);
 
 }  // namespace palpate
