@@ -281,7 +281,7 @@ ChildResult run_in_child(const ChildTask& task, const std::function<ChildResult(
 }
 
 void fail_on_answer() {
-  throw Error("what a child process sent is damaged", "palpate", "repair or remesh the input");
+  throw Error("the answer of a child process is damaged", "palpate", "repair or remesh the input");
 }
 
 }  // namespace palpate

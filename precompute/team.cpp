@@ -45,7 +45,7 @@ bool Team::work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) 
 
 std::unique_ptr<SpreadNumbers> Team::spread(const SparseMatrix& /*K*/, const Factor& /*analysed*/,
                                             int /*jobs*/) {
-  throw std::logic_error("one process has nobody to spread a factor over");
+  throw std::logic_error("a single process cannot spread a factor");
 }
 
 }  // namespace palpate

@@ -122,7 +122,7 @@ class Walk {
   /// Decodes this record; `all` are the earlier ones of its kind.
   template <class T>
   T record(const std::vector<T>& all, const char* what) const {
-    if (length_ > most_text || all.size() >= most_texts) refuse("is more than there is room for");
+    if (length_ > most_text || all.size() >= most_texts) refuse("exceeds the limits of this program");
     const std::string bytes = read_bytes(file_, at_ + head_bytes, length_);
     Fields fields(bytes);
     T one;

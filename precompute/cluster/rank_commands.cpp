@@ -36,7 +36,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
   add_bake_options(app, arguments.bake);
   app.add_option(
          "--factor", arguments.factor_of,
-         "who has a factor of K: each rank; or all ranks together, by MUMPS (distributed). auto: each "
+         "holder of a factor of K: each rank; or all ranks together, by MUMPS (distributed). auto: each "
          "rank, and all together where one cannot hold it; default: auto")
       ->option_text("auto|rank|distributed")
       ->check(CLI::IsMember({"auto", "rank", "distributed"}));

@@ -241,7 +241,7 @@ KeyTable damping() {
   return {"[dynamics] damping",
           {{"mass", "1/s", "0", "a ≥ 0"},
            {"stiffness", "s", "0", "b ≥ 0"},
-           {"ratios", "", "", "instead of these: shares of critical damping `[z1, z2]` ..."},
+           {"ratios", "", "", "instead of these: damping ratios (1 is critical) `[z1, z2]` ..."},
            {"frequencies", "Hz", "", "... at two frequencies `[f1, f2]`, from which a, b ≥ 0 must follow"}}};
 }
 

@@ -19,7 +19,7 @@ std::string first_description(const std::filesystem::path& file, std::string_vie
   std::string text = "    name = " + toml_string(name_without_ending(file)) + "\n";
   if (plane) text += "    plane = \"stress\"\n    thickness = 0.001    # metres\n";
   text += "    [geometry]\n    " + std::string(key) + " = " + toml_string(file.filename().string()) + "\n";
-  text += plane ? "    scale = 0.001    # metres a pixel\n"
+  text += plane ? "    scale = 0.001    # metres per pixel\n"
                 : "    scale = 0.001    # metres per unit of the file: 0.001 for millimetres, 1 for metres\n";
   if (plane || key == "image")
     text += "    [mesh]\n    edge_length = 0.01    # metres, of the elements at the boundary\n";

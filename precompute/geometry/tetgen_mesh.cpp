@@ -169,7 +169,7 @@ Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& 
     throw Error(
         "TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status), where,
         "repair or remesh the surface (edge_length and remesh = true in [mesh]), or set mesher = \"cgal\"; "
-        "of an image, change edge_length");
+        "for an image, change edge_length");
   }
   Mesh mesh = unpack_mesh(result.bytes);
   if (mesh.connectivity.empty()) {

@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view magic = "#INRIMAGE-4#{\n";
 constexpr std::string_view header_end = "##}";
 constexpr std::size_t largest_header = 65'536;
-const char* const complete_inr = "use a complete INR file (.inr, .inr.gz) with one label a voxel";
+const char* const complete_inr = "use a complete INR file (.inr, .inr.gz) with one label per voxel";
 
 /// Text after "NAME=" in the last line that begins so.
 std::optional<std::string_view> field(std::string_view header, std::string_view name) {

@@ -190,7 +190,7 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                           .hint = complete_file,
                           .files = {file.get()}};
   const ChildResult read = run_in_child(task, [&] { return kind.read(file, image.range); });
-  if (read.status == not_scalar) throw Error("the image has several values a voxel", where, complete_file);
+  if (read.status == not_scalar) throw Error("the image has several values per voxel", where, complete_file);
   if (read.status != read_ok) throw not_readable();
   const VoxelBody whole = select(read.bytes, image, notes);
   VoxelBody body = crop(whole, 2);

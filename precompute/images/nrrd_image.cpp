@@ -25,7 +25,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t largest_nrrd_header = 1 << 20;  // Slicer's segments are described there
-const char* const complete_nrrd = "use a complete NRRD file (.nrrd) with one label a voxel";
+const char* const complete_nrrd = "use a complete NRRD file (.nrrd) with one label per voxel";
 
 /// Fields of a header by teem's numbers (nrrdField), since some have several names.
 struct Header {

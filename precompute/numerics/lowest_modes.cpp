@@ -207,7 +207,7 @@ std::optional<Modes> lanczos(const Factor& factor, const SparseMatrix& K, const 
       if (none_left_out(factor, K, M, modes.omega)) return modes;
     }
     if (basis == K.rows())
-      throw Error(fmt::format("Lanczos' method has not found the {} lowest modes", wanted),
+      throw Error(fmt::format("the Lanczos method has not found the {} lowest modes", wanted),
                   "[dynamics] modes", "Ask for some modes more or fewer");
   }
 }

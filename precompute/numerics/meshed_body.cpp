@@ -227,7 +227,7 @@ void note_middles(const Description& description, MeshedBody& body) {
     const std::size_t middles = middles_between(body.mesh, listed.nodes).size();
     if (middles == 0) return;
     body.notes.push_back(
-        fmt::format("{}: with the {} listed nodes count the middles of the edges between them, {}", entry,
+        fmt::format("{}: the {} listed nodes include the middles of the edges between them, {}", entry,
                     listed.nodes.size(), middles));
   });
 }
