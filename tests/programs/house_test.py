@@ -118,6 +118,21 @@ class Rules(unittest.TestCase):
         self.write("base/error.h", "/// An error.\nint a();\n/// The same with a hint.\nint b();\n")
         self.refused("base/error.h:3: a doc comment that begins with 'The same'")
 
+    def test_a_doc_comment_that_begins_with_a_question_is_refused(self):
+        self.write("base/error.h", "// Errors, and\n// what they say.\n/// An error, with\n/// what it says.\nint a();\nint b;  ///< number of errors\n        ///< and of hints\nint c;  // what follows\n")
+        self.assertEqual(self.check()[0], 0, self.check()[1])
+        for text, line in (("// What is wrong.\n", 1), ("\n/// How it ends.\nint a();\n", 2), ("int a;\nint b;  ///< that are open\n", 2), ("/// An error.\nint a;  ///< and its hint\n", 2)):
+            self.write("base/error.h", text)
+            self.refused(f"base/error.h:{line}: a doc comment that begins with '", "': say what the thing is")
+
+    def test_a_word_that_the_field_has_another_for_is_refused(self):
+        self.write("base/error.h", 'int patience;  ///< timeout, as `patience` is one of "nobody"\n// Nobody reads this.\n/// Two nodes of an element share a side; it is a tick.\n')
+        self.assertEqual(self.check()[0], 0, self.check()[1])
+        for text, word in (("/// Waits with patience.", "patience"), ("/// All but for one.", "but for"), ("int a;  ///< numbers a node", "numbers a node"), ("// Room for errors.", "Room"),
+                           ("/// Ends the act.", "the act"), ("/// The share of all.", "The share"), ("/// Columns\n/// of what is near.", "of what")):
+            self.write("base/error.h", text + "\n")
+            self.refused(f": '{word}' in a doc comment: rather ")
+
     def test_a_hint_that_ends_in_a_full_stop_is_refused(self):
         self.write("base/error.h", 'f("a. b", "look at " + x);  // "a stop."\ng("one. "\n  "two", \'"\', path("."));\napp.footer("A page.");\nh("... and so on", "It" + (a ? "."\n + b : "c"));\n')
         self.assertEqual(self.check()[0], 0, self.check()[1])
