@@ -1,4 +1,4 @@
-// Bounds on a vector and on how fast it changes.
+// Bounds on the length of a vector and on its rate of change.
 #pragma once
 
 #include <cmath>
@@ -7,27 +7,28 @@
 
 namespace palpate {
 
-/// The vector shortened to at most `most`; zero where the length is no number.
+/// Returns the vector shortened to at most `most`; zero if its length is not finite.
 inline Vec3 clamped(const Vec3& vector, double most) noexcept {
   const double length = vector.norm();
   if (!std::isfinite(length)) return Vec3::Zero();
   return length <= most ? vector : Vec3(vector * (most / length));
 }
 
-/// A vector that follows another at a bounded rate. Within a ball it stays, as long as what it follows does.
+/// Vector that follows another one at a bounded rate. It stays inside any ball that contains the vector it
+/// follows.
 class RateClamp {
  public:
-  /// `most`: of change [unit/s].
+  /// `most`: largest rate of change [unit/s].
   explicit RateClamp(double most) noexcept : most_(most) {}
 
-  /// After `time` [s].
+  /// Moves towards `wanted` for `time` [s] and returns the new value.
   Vec3 follow(const Vec3& wanted, double time) noexcept {
     const Vec3 change = wanted - value_;
     value_ = change.norm() <= most_ * time ? wanted : Vec3(value_ + clamped(change, most_ * time));
     return value_;
   }
 
-  /// What it follows had a share of the last value meanwhile.
+  /// Scales the current value by `share`, when the followed vector was scaled outside this class.
   void scale(double share) noexcept { value_ *= share; }
 
   void reset() noexcept { value_.setZero(); }

@@ -1,4 +1,4 @@
-// Ticks that come late.
+// Detection of late ticks.
 #pragma once
 
 #include <algorithm>
@@ -6,22 +6,23 @@
 namespace palpate {
 
 struct DeadlineOptions {
-  double tolerance = 0.0005;  ///< a tick this late is a miss [s]
-  double fade = 0.005;        ///< from whole to no force while ticks are late [s]
-  double recovery = 0.1;      ///< back, while they are in time [s]
-  double most = 10.0;         ///< misses that are a fault
-  double forgiveness = 0.01;  ///< misses that a tick in time makes good: more than one in a hundred adds up
+  double tolerance = 0.0005;  ///< lateness above which a tick counts as a miss [s]
+  double fade = 0.005;        ///< time from full to no force while ticks are late [s]
+  double recovery = 0.1;      ///< time back to full force once they are on time [s]
+  double most = 10.0;         ///< number of misses that is a fault
+  double forgiveness = 0.01;  ///< misses forgiven per tick on time: more than one late tick in a hundred adds
+                              ///< up
 };
 
-/// Scales force down while ticks are late, and counts.
+/// Scales the force down while ticks are late and counts the misses.
 class DeadlineWatch {
  public:
-  /// `period`: of the loop [s].
+  /// `period`: period of the loop [s].
   DeadlineWatch(const DeadlineOptions& options, double period) noexcept
       : options_(options), period_(period) {}
 
-  /// Each tick. `lateness`: of this one [s]; `elapsed` since the one before [s]. A late tick misses as many
-  /// as would have come since then.
+  /// Updates the watch; call once per tick. `lateness` is that of this tick [s], `elapsed` the time since the
+  /// last one [s]. A late tick counts as elapsed / period misses, at least one.
   void see(double lateness, double elapsed) noexcept {
     if (lateness > options_.tolerance) {
       share_ = std::max(0.0, share_ - std::max(elapsed, period_) / options_.fade);
@@ -32,9 +33,9 @@ class DeadlineWatch {
     }
   }
 
-  [[nodiscard]] double share() const noexcept { return share_; }  ///< of the force [0, 1]
+  [[nodiscard]] double share() const noexcept { return share_; }  ///< factor on the force [0, 1]
   [[nodiscard]] bool failed() const noexcept { return misses_ >= options_.most; }
-  [[nodiscard]] double misses() const noexcept { return misses_; }  ///< that are not forgiven
+  [[nodiscard]] double misses() const noexcept { return misses_; }  ///< misses not yet forgiven
 
   void reset() noexcept {
     share_ = 1.0;

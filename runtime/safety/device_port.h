@@ -1,4 +1,4 @@
-// A device as its two threads see it.
+// Connection to a device, as used by the device's two threads.
 #pragma once
 
 #include <string>
@@ -7,40 +7,41 @@
 
 namespace palpate {
 
-/// The wire to a device: a HID device, another process. One thread opens, reads and closes, another one
-/// writes in between; the tick never comes here. After a device was lost it may be closed and opened again.
+/// Connection to a HID device or to another process. One thread opens, reads and closes; another one writes
+/// in between. The tick never calls it. A lost device may be closed and opened again.
 class DevicePort {
  public:
   enum class ReadResult {
-    report,   ///< a new one
-    nothing,  ///< in the time that a read waits, or nothing that makes sense
-    lost,     ///< unplugged or broken: close, and open again when it is back
+    report,   ///< a new report
+    nothing,  ///< no report within the waiting time, or none that is valid
+    lost,     ///< unplugged or broken: close, and open again once it is back
   };
 
   virtual ~DevicePort() = default;
 
-  /// Opens the device, again after a close, and does what it needs before it can show forces. Throws Error
-  /// that says why not and what to do.
+  /// Opens the device, also after a close, and prepares it to display forces. Throws Error with the reason
+  /// and a hint.
   virtual void open() = 0;
 
-  /// Waits for a report for at most 10 ms and takes the newest. Fills `state`: in the device's frame, with
-  /// velocity, time of arrival (CLOCK_MONOTONIC) and number. Otherwise leaves it as it is.
+  /// Waits at most 10 ms for a report and keeps the newest. On success fills `state`: device frame, with
+  /// velocity, time of arrival (CLOCK_MONOTONIC) and sequence number. Otherwise leaves it unchanged.
   virtual ReadResult read(DeviceState& state) noexcept = 0;
 
-  /// Shows a command that follows from `state`; false when the device is lost. May block for milliseconds.
+  /// Displays a command computed from `state`; false if the device is lost. May block for milliseconds.
   virtual bool write(const DeviceCommand& command, const DeviceState& state) noexcept = 0;
 
-  /// No force, then closes. Neither read nor write is running. Does nothing when it is not open.
+  /// Sets the force to zero, then closes. Must not run during read or write. Does nothing if the device is
+  /// not open.
   virtual void close() noexcept = 0;
 
-  /// What the device can bear; known once it was open.
+  /// Limits of the device; known once it has been opened.
   [[nodiscard]] virtual DeviceLimits limits() const = 0;
 
-  /// What came and was not taken, for a person: "3 of a wrong size, 1 too old"; empty: nothing. From any
+  /// Text on rejected input: "3 of a wrong size, 1 too old"; empty if there was none. May be called from any
   /// thread.
   [[nodiscard]] virtual std::string refusals() const = 0;
 
-  /// What a person calls it: profile, ids, path.
+  /// Name for messages: profile, ids, path.
   [[nodiscard]] virtual std::string name() const = 0;
 };
 

@@ -1,4 +1,4 @@
-// Why there is no force.
+// Faults and phases of the safety layer.
 #pragma once
 
 #include <array>
@@ -7,14 +7,14 @@
 
 namespace palpate {
 
-/// What ended the force, until it is acknowledged. The reference of the book shows these comments.
+/// Fault that stopped the force, until it is acknowledged. The book's reference shows these comments.
 enum class Fault : std::uint8_t {
   none = 0,
   too_fast = 1,         ///< the device moved faster than the speed limit, or its position jumped
   device_silent = 2,    ///< no new report for too long
   device_frozen = 3,    ///< new reports, always the same numbers
   deadline_missed = 4,  ///< too many late ticks
-  buzzing = 5,          ///< force or hand chattered until no force was left
+  buzzing = 5,          ///< force or hand chattered until the force had faded to zero
   device_lost = 6,      ///< the device was unplugged, or cannot be read or written
   input_lost = 7,       ///< the viewer that moved the tool is gone
   stopped = 8,          ///< emergency stop
@@ -33,16 +33,17 @@ inline constexpr std::array<std::pair<Fault, const char*>, 9> fault_names = {{
     {Fault::stopped, "stopped"},
 }};
 
-/// Whether the hand feels anything, and if not, what it waits for. The reference shows these comments.
+/// Phase of the safety layer: force on, or the reason why it is off. The book's reference shows these
+/// comments.
 enum class SafetyPhase : std::uint8_t {
-  waiting = 0,    ///< for the tool to be clear of the body and the force to be small
-  ramping = 1,    ///< force on its way from zero
-  active = 2,     ///< force as the rules let it through
+  waiting = 0,    ///< waits until the tool is clear of the body and the force is small
+  ramping = 1,    ///< force ramps up from zero
+  active = 2,     ///< force is on, within the safety bounds
   faulted = 3,    ///< no force until acknowledged
-  shut_down = 4,  ///< no force any more
+  shut_down = 4,  ///< force is off for good
 };
 
-/// Phases of safety and their names.
+/// The phases and their names, for reports.
 inline constexpr std::array<std::pair<SafetyPhase, const char*>, 5> safety_phase_names = {{
     {SafetyPhase::waiting, "waiting"},
     {SafetyPhase::ramping, "ramping"},

@@ -1,4 +1,4 @@
-// The clock that device threads and the loop stamp by.
+// Clock of the loop and of the device threads.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-/// CLOCK_MONOTONIC [ns].
+/// Returns CLOCK_MONOTONIC [ns].
 inline std::int64_t monotonic_now() noexcept {
   timespec time{};
   clock_gettime(CLOCK_MONOTONIC, &time);

@@ -1,4 +1,4 @@
-// Numbers and times that arithmetic can bear, whatever a device or a solver said.
+// Checks that numbers and times from a device or a solver are safe to calculate with.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// Finite, and so small that products of two do not overflow.
+/// True if the value is finite and small enough that a product of two does not overflow.
 inline bool is_plausible(double value) noexcept {
   return std::abs(value) < 1e100;
 }
@@ -18,19 +18,19 @@ bool is_plausible(const Eigen::DenseBase<Derived>& values) noexcept {
   return (values.derived().array().abs() < 1e100).all();
 }
 
-/// Pose and velocity.
+/// True if pose and velocity are plausible.
 inline bool is_plausible(const DeviceState& device) noexcept {
   return is_plausible(device.pose.position) && is_plausible(device.pose.orientation.coeffs()) &&
          is_plausible(device.velocity);
 }
 
-/// Wrench and local model.
+/// True if wrench and local model are plausible.
 inline bool is_plausible(const DeviceCommand& command) noexcept {
   return is_plausible(command.wrench.force) && is_plausible(command.wrench.torque) &&
          is_plausible(command.local.stiffness) && is_plausible(command.local.point);
 }
 
-/// From one monotonic time [ns] to another [s]: it cannot overflow.
+/// Returns the time from one monotonic time [ns] to another [s]; cannot overflow.
 inline double seconds_between(std::int64_t from, std::int64_t to) noexcept {
   return (static_cast<double>(to) - static_cast<double>(from)) * 1e-9;
 }

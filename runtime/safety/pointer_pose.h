@@ -1,14 +1,14 @@
-// What a pointer on a screen says of a tool.
+// Tool pose requested by a pointer on a screen.
 #pragma once
 
 #include "runtime/touch/tool.h"
 
 namespace palpate {
 
-/// Where the pointer wants the tool.
+/// Tool pose requested by a pointer.
 struct PointerPose {
   ToolPose pose;
-  bool lifted = false;  ///< it hovers: nothing is felt of the way to where it is let down
+  bool lifted = false;  ///< the tool hovers: the path to where it is lowered is not felt
 };
 
 }  // namespace palpate

@@ -120,7 +120,7 @@ DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
   return command;
 }
 
-/// After a gap between ticks: the device has gone on by itself and let the force fade, as a stale solution.
+/// Scales the force as the device did during a gap between ticks, when it let it fade as a stale solution.
 void Safety::bridge_gap(double elapsed) noexcept {
   const double past = (elapsed - options_.stale.time_to_live) / options_.stale.fade;
   if (past <= 0.0) return;
@@ -130,7 +130,7 @@ void Safety::bridge_gap(double elapsed) noexcept {
   if (left <= 0.0) begin_anew();
 }
 
-/// Out of contact, with the ramp.
+/// Starts again: the gate waits until the tool is out of contact, then the ramp begins at zero.
 void Safety::begin_anew() noexcept {
   gate_.close();
   ramp_.restart();
@@ -141,7 +141,7 @@ LocalModel Safety::local_model(const Vec3& wanted, double share) const noexcept 
   LocalModel local;
   local.force = shown_;
   local.point = device_.pose.position;
-  if (shown_ != wanted) return local;  // cut: there is no slope
+  if (shown_ != wanted) return local;  // limited by a clamp: no slope
   local.stiffness = share * solution_.local.stiffness;
   const double left = solution_.local.radius - (local.point - solution_.local.point).norm();
   const double room = (options_.max_force - shown_.norm()) / std::max(local.stiffness.norm(), 1e-9);

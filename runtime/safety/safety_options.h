@@ -1,4 +1,4 @@
-// The bounds between the solver and a hand, each with its name, unit, range and meaning.
+// Bounds of the safety layer, each with its name, unit, range and meaning.
 #pragma once
 
 #include <string_view>
@@ -11,28 +11,28 @@
 
 namespace palpate {
 
-/// SI units. Where the device's limits are lower, they hold. Bounds that are not wanted are made large.
+/// Safety bounds in SI units. A lower limit of the device takes precedence. A large value disables a bound.
 struct SafetyOptions {
-  double period = 0.001;          ///< of the loop [s]
-  double max_force = 3.0;         ///< [N]; of hand-held devices the weakest shows 3.3 (Touch)
-  double max_torque = 0.1;        ///< [N m]; half of what a sigma.7 shows
-  double max_force_rate = 500.0;  ///< [N/s]; a wall of 1000 N/m that is met at 0.5 m/s
-  double max_torque_rate = 10.0;  ///< [N m/s]; a lever of 2 cm at that
-  double max_stiffness =
-      2000.0;                ///< of the local model [N/m]; Polhem v3's, between Touch's 400 and omega's 5000
-  double max_damping = 5.0;  ///< that the passivity controller adds [N s/m]: K T / 2 of 10 kN/m (Colgate
-                             ///< and Brown); 0: it only observes
-  double max_speed = 1.0;    ///< of the device [m/s]; palpation stays below 0.3
-  double ramp = 1.0;         ///< from no to whole force [s]; CHAI3D takes 2
-  double small_force = 0.1;  ///< below which force may begin [N] ...
-  double calm_time = 0.01;   ///< ... when it was so for this long [s]
+  double period = 0.001;          ///< period of the loop [s]
+  double max_force = 3.0;         ///< [N]; the weakest hand-held device displays 3.3 (Touch)
+  double max_torque = 0.1;        ///< [N m]; half of what a sigma.7 displays
+  double max_force_rate = 500.0;  ///< [N/s]; a wall of 1000 N/m hit at 0.5 m/s
+  double max_torque_rate = 10.0;  ///< [N m/s]; the same wall at a lever of 2 cm
+  double max_stiffness = 2000.0;  ///< stiffness of the local model [N/m]; that of a Polhem v3, between
+                                  ///< Touch's 400 and omega's 5000
+  double max_damping = 5.0;  ///< damping added by the passivity controller [N s/m]: K T / 2 of 10 kN/m
+                             ///< (Colgate and Brown); 0: it only observes
+  double max_speed = 1.0;    ///< speed of the device [m/s]; palpation stays below 0.3
+  double ramp = 1.0;         ///< time from no to full force [s]; CHAI3D takes 2
+  double small_force = 0.1;  ///< force below which the gate may open [N]
+  double calm_time = 0.01;   ///< time for which the force must have been that small [s]
   DeadlineOptions deadline{};
   SilenceOptions silence{};
   StaleOptions stale{};
   BuzzOptions buzz{};
 };
 
-/// A bound as `--safety`, its help and the documentation have it.
+/// Description of a bound for `--safety`, its help and the documentation.
 struct SafetyField {
   std::string_view name;
   std::string_view unit;
@@ -40,9 +40,9 @@ struct SafetyField {
   std::string_view meaning;
 };
 
-/// Calls visit(field, number) for each bound; the number is a double or an int. The period is none: it
-/// follows from the loop's rate. A member that is added to the options must be named here, or nothing
-/// compiles.
+/// Calls visit(field, number) for each bound; the number is a double or an int. The period is not a bound: it
+/// follows from the loop rate. A new member of the options must be named here, otherwise this does not
+/// compile.
 template <class SomeOptions, class Visitor>
 void for_each_safety_field(SomeOptions&& options, Visitor&& visit) {
   auto& [period, max_force, max_torque, max_force_rate, max_torque_rate, max_stiffness, max_damping,

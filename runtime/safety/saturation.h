@@ -1,18 +1,18 @@
-// What is left of a command that is more than a device can do.
+// Saturation of a command at the limit of a device.
 #pragma once
 
 #include "meshes/mesh.h"
 
 namespace palpate {
 
-/// A command within bounds, and how much of what was asked for that is.
+/// Command within bounds, and the fraction of the request that it amounts to.
 struct Saturated {
   Vec3 value = Vec3::Zero();
-  double shown = 1.0;  ///< 1: all of it; less: value is so much of the wanted; 0: it was not a number
+  double shown = 1.0;  ///< value / wanted: 1 if not saturated; 0 if wanted was not finite
 };
 
-/// `wanted` scaled as a whole until no entry is larger than `largest`, so that its direction stays. A wanted
-/// that is not finite becomes zero.
+/// Scales `wanted` as a whole until no entry exceeds `largest`, which keeps its direction. If it is not
+/// finite, returns zero.
 [[nodiscard]] inline Saturated saturate(const Vec3& wanted, double largest) noexcept {
   if (!wanted.allFinite()) return {Vec3::Zero(), 0.0};
   const double peak = wanted.cwiseAbs().maxCoeff();

@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-/// Numbers wrap around.
+/// True if `sequence` is ahead of `of`; sequence numbers wrap around.
 bool is_ahead(std::uint32_t sequence, std::uint32_t of) noexcept {
   return static_cast<std::int32_t>(sequence - of) > 0;
 }

@@ -1,4 +1,4 @@
-// A device that moves faster than a hand.
+// Detection of a device that moves faster than a hand.
 #pragma once
 
 #include <algorithm>
@@ -8,13 +8,14 @@
 
 namespace palpate {
 
-/// The speed of the device, by what it says and by how far it came: an encoder that jumps says nothing of it.
+/// Speed of the device: the larger of the reported velocity and the distance moved per time. The second
+/// catches an encoder that jumps.
 class SpeedLimit {
  public:
-  /// `most` [m/s]; `period` of the reports [s].
+  /// `most`: largest speed [m/s]; `period`: time between reports [s].
   SpeedLimit(double most, double period) noexcept : most_(most), period_(period) {}
 
-  /// Each new report.
+  /// Updates the speed; call for each new report.
   void see(const DeviceState& report) noexcept {
     speed_ = report.velocity.norm();
     if (has_last_)
@@ -29,9 +30,10 @@ class SpeedLimit {
   void reset() noexcept { *this = SpeedLimit(most_, period_); }
 
  private:
-  /// Since the last report: it may have been delayed on its way, so by its number too, [s].
+  /// Time since the last report [s]. A report may have been delayed on its way, so its sequence number counts
+  /// too.
   [[nodiscard]] double time(const DeviceState& report) const noexcept {
-    constexpr std::uint32_t most_lost = 20;  // more is silence
+    constexpr std::uint32_t most_lost = 20;  // a longer gap is silence
     const double reports = std::min(report.sequence - last_.sequence, most_lost);
     return std::max({seconds_between(last_.arrived, report.arrived), reports * period_, period_});
   }

@@ -1,4 +1,4 @@
-// How fast a handle moves, from places that are known to a resolution only.
+// Velocity of a handle from positions of finite resolution.
 #pragma once
 
 #include <array>
@@ -11,20 +11,20 @@
 namespace palpate {
 
 /// Velocity by first-order adaptive windowing, end fit (Janabi-Sharifi, Hayward, Chen 2000, "Discrete-time
-/// adaptive windowing for velocity estimation"): along each axis the slope from an earlier place to the
-/// newest, over the longest window (at most 15 places) whose places all lie within the resolution of that
-/// line. Long windows where the motion is even, so that quantisation hardly counts; short ones where it
-/// changes.
+/// adaptive windowing for velocity estimation"). For each axis it is the slope from an earlier position to
+/// the newest, over the longest window (at most 15 positions) in which all positions lie within the
+/// resolution of that line. Windows are long while the motion is uniform, which suppresses quantisation, and
+/// short where it changes.
 class VelocityEstimator {
  public:
   static constexpr std::size_t most_places = 15;
 
-  /// `resolution` [m]: what two neighbouring numbers of the device mean. A place is known to half of it, so a
-  /// line through two measured places misses a third one by at most all of it.
+  /// `resolution` [m]: distance between two neighbouring readings of the device, per axis. A position is
+  /// accurate to half of it, so a line through two readings misses a third one by at most all of it.
   explicit VelocityEstimator(const Vec3& resolution) noexcept : resolution_(resolution) {}
 
-  /// The velocity [m/s] at `position` [m], measured at `time` [ns]. 0 at the first place; as before where no
-  /// time has passed.
+  /// Returns the velocity [m/s] at `position` [m], measured at `time` [ns]. 0 at the first position;
+  /// unchanged if no time has passed.
   Vec3 take(const Vec3& position, std::int64_t time) noexcept {
     if (count_ > 0 && time <= place(0).time) return velocity_;
     newest_ = (newest_ + 1) % most_places;
@@ -42,12 +42,12 @@ class VelocityEstimator {
     std::int64_t time = 0;
   };
 
-  /// The one of so many places before the newest.
+  /// Returns the position `ago` samples before the newest.
   [[nodiscard]] const Place& place(std::size_t ago) const noexcept {
     return places_[(newest_ + most_places - ago) % most_places];
   }
 
-  /// From `ago` places before the newest to it [m/s].
+  /// Slope from `ago` samples before the newest to the newest [m/s].
   [[nodiscard]] double slope_over(int axis, std::size_t ago) const noexcept {
     return (place(0).position[axis] - place(ago).position[axis]) / seconds_since(ago);
   }
