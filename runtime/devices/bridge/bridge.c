@@ -1,11 +1,11 @@
-/* A device behind a bridge: this process has the device, palpate-runtime the body; they speak by a Unix
- * socket. As it stands the device is a simulated hand, a mass that a spring and a damper draw to a target.
- * For yours replace the four device_ functions by calls of your SDK, and where it calls you a thousand times
- * a second, let it call bridge_cycle: docs/devices.md. Build: cc bridge.c -lm -o bridge
+/* Example of a bridge: this process drives the device, palpate-runtime the body; they communicate through a
+ * Unix socket. The device is a simulated hand, a mass drawn to a target by a spring and a damper. For your
+ * own, replace the four device_ functions by calls of your SDK; if the SDK calls you a thousand times per
+ * second, call bridge_cycle from there: docs/devices.md. Build: cc bridge.c -lm -o bridge
  * Usage: bridge [--socket FILE] [--rate 1000 Hz] [--seconds 10] [--from X,Y,Z m] [--to X,Y,Z m] [--period 0
- * s] The target goes from `from` to `to` and back once a period (0: it stays). Without --to it goes straight
- * down until the hand feels 0.5 N, at most to the workspace's end, and up again. We must be of the runtime's
- * user, and then find its socket ourselves. */
+ * s] The target moves from `from` to `to` and back once per period (0: it stays). Without --to it moves
+ * straight down until the hand feels 0.5 N, at most to the workspace's end, and up again. The bridge must run
+ * as the runtime's user; it then finds the socket itself. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <signal.h>
@@ -35,7 +35,7 @@ static struct {
 } hand;
 static const float limits[5] = {8.0f, 0.0f, 2000.0f, 20.0f, 0.15f};
 
-/* How far below `from` the target is that looks for a body [m]. */
+/* Depth of the target below `from` while it searches for a body [m]. */
 static double probing_depth(double dt) {
   const double speed = 0.04, enough = 0.5, most = (double)limits[4]; /* m/s, N, m */
   if (hand.down >= most || hand.force[2] >= enough) hand.rises = 1;
@@ -43,7 +43,7 @@ static double probing_depth(double dt) {
   return hand.down = fmin(fmax(hand.down + (hand.rises ? -speed : speed) * dt, 0.0), most);
 }
 
-/* Not 0: there is none. */
+/* Returns 0, or another number if there is no device. */
 static int device_open(void) {
   memcpy(hand.x, from, sizeof hand.x);
   hand.start = hand.last = seconds_now();
@@ -71,7 +71,7 @@ static void device_read(struct bridge_state* state) {
 
 static void device_show(const double force[3], const double torque[3]) {
   memcpy(hand.force, force, sizeof hand.force);
-  (void)torque; /* this one has no motors for it */
+  (void)torque; /* this device has no motors for it */
 }
 
 static void device_close(void) {
@@ -81,7 +81,7 @@ static void device_close(void) {
 
 /* --- the bridge --- */
 
-/* palpate/bridge.socket in the first of these folders that is set, as the runtime has it. */
+/* Finds palpate/bridge.socket in the first of these folders that is set, as the runtime does. */
 static void find_socket(char* path, size_t size) {
   const char *runtime = getenv("XDG_RUNTIME_DIR"), *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
   const char* folder = runtime != NULL && *runtime == '/' ? runtime
@@ -93,13 +93,13 @@ static void find_socket(char* path, size_t size) {
 
 static int wire = -1;
 static struct sockaddr_un runtime = {.sun_family = AF_UNIX};
-static double asked = 0.0; /* the runtime, for a connection [s] */
+static double asked = 0.0; /* time of the last attempt to connect [s] */
 static uint32_t said = 0;
 static struct bridge_command command;
-static double arrived; /* the command [s] */
+static double arrived; /* time of arrival of the command [s] */
 static unsigned long commands = 0;
 
-/* Asks five times a second. */
+/* Tries to connect, at most five times per second. */
 static void bridge_connect(void) {
   if (seconds_now() - asked < 0.2) return;
   asked = seconds_now();
@@ -109,13 +109,13 @@ static void bridge_connect(void) {
   wire = -1;
 }
 
-/* Tells the runtime, hears what it said last. */
+/* Sends the state and receives the latest command. */
 static void bridge_exchange(const struct bridge_state* state) {
   struct bridge_command next;
   send(wire, state, sizeof *state, MSG_DONTWAIT | MSG_NOSIGNAL);
   for (;;) {
     const ssize_t size = recv(wire, &next, sizeof next, MSG_DONTWAIT | MSG_TRUNC);
-    if (size < 0 && errno == ECONNRESET) continue; /* said once; what it said before is still there */
+    if (size < 0 && errno == ECONNRESET) continue; /* reported once; earlier messages are still there */
     if (size < 0) return;
     if (size == 0) break;
     if (size != (ssize_t)sizeof next || memcmp(next.magic, "PLPC", 4) != 0 || next.version != BRIDGE_VERSION)
@@ -124,11 +124,11 @@ static void bridge_exchange(const struct bridge_state* state) {
     arrived = seconds_now();
     ++commands;
   }
-  close(wire); /* the runtime has gone: its last command expires, and perhaps another one comes */
+  close(wire); /* the runtime has gone: its last command expires, and it may return */
   wire = -1;
 }
 
-/* Reads the device, tells the runtime, shows what it said last. Nothing here waits. */
+/* Reads the device, sends its state and displays the latest command. Never waits. */
 static void bridge_cycle(struct bridge_state* state, double force[3]) {
   const uint64_t now = (uint64_t)(1e9 * seconds_now());
   device_read(state);
@@ -156,7 +156,7 @@ struct options {
   const char* socket;
 };
 
-/* 0 where they cannot be understood. */
+/* Returns 0 if the options are invalid. */
 static int read_options(int argc, char** argv, struct options* options) {
   int bad = argc % 2 == 0;
   for (int k = 1; k + 1 < argc; k += 2) {
@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
     bridge_cycle(&state, force);
     largest = fmax(largest, sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]));
     ++cycles;
-    due = fmax(due + 1.0 / options.rate, seconds_now()); /* what is missed is not made good in a burst */
+    due = fmax(due + 1.0 / options.rate, seconds_now()); /* missed cycles are not made up in a burst */
     const struct timespec wake = {(time_t)due, (long)(1e9 * (due - floor(due)))};
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, NULL);
     now = seconds_now();

@@ -1,4 +1,4 @@
-/* What a device shows of a command, at its own rate. C99 and C++; SI units. */
+/* Force and torque that a device displays for a command, at its own rate. C99 and C++; SI units. */
 #ifndef PALPATE_BRIDGE_FORCE_H
 #define PALPATE_BRIDGE_FORCE_H
 
@@ -6,7 +6,7 @@
 
 #include "bridge_wire.h"
 
-/* What is left of a command `age` after it arrived: all for its time to live, then less and less. */
+/* Factor on a command `age` [s] after its arrival: 1 during its time to live, then it fades to 0. */
 static inline double bridge_share(const struct bridge_command* command, double age) {
   const double late = age - 1e-3 * command->time_to_live, fade = 1e-3 * command->fade;
   if (command->mode == BRIDGE_ZERO || command->mode > BRIDGE_LOCAL_MODEL) return 0.0;
@@ -14,15 +14,15 @@ static inline double bridge_share(const struct bridge_command* command, double a
   return late < fade ? 1.0 - late / fade : 0.0;
 }
 
-/* No longer than `most` (0: not said), and nothing where it is no number. */
+/* Shortens the vector to at most `most` (0: unlimited); sets it to zero if its length is not finite. */
 static inline void bridge_clamp(double vector[3], double most) {
   const double length = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
   const double share = most > 0.0 && length > most ? most / length : 1.0;
   for (int k = 0; k < 3; ++k) vector[k] = isfinite(length) ? share * vector[k] : 0.0;
 }
 
-/* The force on the hand at x [m] that moves with v [m/s]: F - K (x - x0) - b v, where x is farther than the
- * radius from x0 with x - x0 cut to it; F alone where there is no model. */
+/* Computes the force [N] on the hand at x [m] with velocity v [m/s]: F - K (x - x0) - b v, with x - x0 cut
+ * to the radius; F alone without a local model. */
 static inline void bridge_force(const struct bridge_command* command, const double x[3], const double v[3],
                                 double age, double device_max_force, double force[3]) {
   const float* K = command->stiffness;
@@ -41,7 +41,7 @@ static inline void bridge_force(const struct bridge_command* command, const doub
   bridge_clamp(force, device_max_force);
 }
 
-/* The torque on the hand [N m]. */
+/* Computes the torque on the hand [N m]. */
 static inline void bridge_torque(const struct bridge_command* command, double age, double device_max_torque,
                                  double torque[3]) {
   for (int k = 0; k < 3; ++k) torque[k] = bridge_share(command, age) * command->torque[k];

@@ -17,9 +17,9 @@ static_assert(sizeof(bridge_state) == 112 && sizeof(bridge_command) == 128, "as 
 
 constexpr double max_distance = 10.0;    // m
 constexpr double max_speed = 100.0;      // m/s
-constexpr double unit_tolerance = 0.01;  // of a quaternion's length
-constexpr double max_age = 0.020;        // s; a device that is silent for so long shows no force
-constexpr double max_ahead = 1.0;        // s; beyond, it is another clock
+constexpr double unit_tolerance = 0.01;  // deviation of a quaternion's length from 1
+constexpr double max_age = 0.020;        // s; a device that has been silent this long displays no force
+constexpr double max_ahead = 1.0;        // s; a time further ahead is from another clock
 constexpr std::size_t head_bytes = 8;    // magic and version
 
 /// xx, yy, zz, xy, yz, zx
@@ -55,7 +55,7 @@ DeviceLimits limits_of(const bridge_state& said) noexcept {
 Refusal read_bridge_state(const bridge_state& said, std::size_t size, std::int64_t now,
                           BridgeState& state) noexcept {
   if (size < head_bytes) return Refusal::size;
-  // Before the size: another version may be of another.
+  // Checked before the size, which may differ between versions.
   if (std::memcmp(said.magic, "PLPS", sizeof said.magic) != 0 || said.version != BRIDGE_VERSION)
     return Refusal::version;
   if (size != sizeof said) return Refusal::size;

@@ -1,4 +1,4 @@
-// The messages of bridge_wire.h as the runtime has them: states are checked, commands made.
+// Messages of bridge_wire.h as the runtime uses them: checked states and encoded commands.
 #pragma once
 
 #include <cstddef>
@@ -10,32 +10,32 @@
 
 namespace palpate {
 
-/// Why a message or a bridge is not taken.
+/// Reason why a message or a bridge is refused.
 enum class Refusal : std::uint8_t {
   none,
-  size,         ///< not as long as it should be
-  version,      ///< does not begin as one of ours, or has another layout
-  not_finite,   ///< a number that is infinite or none
+  size,         ///< wrong length
+  version,      ///< wrong magic bytes, or another version
+  not_finite,   ///< a number that is infinite or NaN
   implausible,  ///< beyond 10 m or 100 m/s, or a limit below 0
-  orientation,  ///< the quaternion's length is not 1 within 1 %
-  age,          ///< 20 ms old, or ahead of this machine's clock
-  user,         ///< the bridge is another user's
+  orientation,  ///< length of the quaternion not 1 within 1 %
+  age,          ///< at least 20 ms old, or ahead of this machine's clock
+  user,         ///< the bridge belongs to another user
 };
 
-/// A bridge's state.
+/// State sent by a bridge.
 struct BridgeState {
   DeviceState device;
   DeviceLimits limits;
   bool fault = false;  ///< the device cannot be used
 };
 
-/// Fills `state`, the orientation normalised, from a message of `size` bytes that arrived at `now` [ns], or
-/// says why not.
+/// Decodes a message of `size` bytes that arrived at `now` [ns] into `state`, with the orientation
+/// normalised, or returns the reason for refusing it.
 [[nodiscard]] Refusal read_bridge_state(const bridge_state& said, std::size_t size, std::int64_t now,
                                         BridgeState& state) noexcept;
 
-/// The command that answers the state of number `answers`. One with numbers that are not finite is without
-/// force.
+/// Returns the command that answers the state with sequence number `answers`. If a number is not finite, the
+/// command has no force.
 [[nodiscard]] bridge_command make_bridge_command(const DeviceCommand& command, std::uint32_t answers,
                                                  const StaleOptions& stale, double max_force) noexcept;
 

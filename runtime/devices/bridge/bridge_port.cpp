@@ -20,9 +20,9 @@
 namespace palpate {
 namespace {
 
-constexpr int max_wait = 10;       // ms that a read waits
-constexpr int max_at_once = 1024;  // messages that a read takes: it ends, whoever floods us
-constexpr int max_waiting = 4;     // bridges beside the partner
+constexpr int max_wait = 10;       // ms; waiting time of a read
+constexpr int max_at_once = 1024;  // messages per read, so that a flood of them cannot keep it busy
+constexpr int max_waiting = 4;     // bridges that wait beside the connected one
 
 constexpr std::array<const char*, 8> refusal_names = {"",
                                                       "messages by size",
@@ -33,7 +33,7 @@ constexpr std::array<const char*, 8> refusal_names = {"",
                                                       "messages by age",
                                                       "bridges by user"};
 
-/// A socket and the address that it is to have or to reach.
+/// Socket and the address that it binds or connects to.
 struct NamedSocket {
   FileDescriptor socket;
   sockaddr_un address{};
@@ -54,7 +54,7 @@ struct NamedSocket {
   }
 };
 
-/// One whose program was killed: nobody listens there.
+/// Removes the socket file of a program that was killed: nothing listens on it.
 void remove_dead_socket(const std::filesystem::path& name) {
   std::error_code nothing_there;
   if (!std::filesystem::is_socket(std::filesystem::symlink_status(name, nothing_there))) return;
@@ -119,7 +119,7 @@ DevicePort::ReadResult BridgePort::read(DeviceState& state) noexcept {
   }
   if (is_gone || seconds_between(heard_, monotonic_now()) > max_silence) {
     if (partner_ >= 0) return ReadResult::lost;
-    bridge_.close();  // it never was the partner
+    bridge_.close();  // it never became the partner
     return ReadResult::nothing;
   }
   if (!is_heard) return ReadResult::nothing;
@@ -153,7 +153,7 @@ bool BridgePort::write(const DeviceCommand& command, const DeviceState& state) n
 void BridgePort::close() noexcept {
   if (listener_.get() < 0) return;
   write({}, {});
-  unlink(options_.socket.c_str());  // while it listens: nobody else has taken the name
+  unlink(options_.socket.c_str());  // still listening, so no other program has taken the name
   partner_ = -1;
   bridge_.close();
   listener_.close();

@@ -1,4 +1,4 @@
-// Another process of the same user as a device, by a Unix socket.
+// Device in another process of the same user, connected through a Unix socket.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@
 namespace palpate {
 
 struct BridgeOptions {
-  std::filesystem::path socket;                  ///< its name, in a folder where nobody else may write
-  double max_force = SafetyOptions{}.max_force;  ///< that a bridge may show, local model included [N]
-  StaleOptions stale{};                          ///< how long a bridge shows a command, and with what damping
+  std::filesystem::path socket;                  ///< path, in a folder that no other user can write to
+  double max_force = SafetyOptions{}.max_force;  ///< largest force displayed, local model included [N]
+  StaleOptions stale{};                          ///< lifetime and damping of a command in the bridge
 };
 
-/// Listens at a socket that only this user can open (SOCK_SEQPACKET, mode 0600). The bridge that connects is
-/// the partner from its first state that is taken, until it disconnects or is silent for `max_silence`;
-/// others wait meanwhile.
+/// Listens on a socket that only this user can open (SOCK_SEQPACKET, mode 0600). A connected bridge is the
+/// partner from its first accepted state until it disconnects or is silent for `max_silence`; others wait in
+/// the meantime.
 class BridgePort final : public DevicePort {
  public:
   static constexpr double max_silence = 1.0;  ///< [s]
@@ -32,26 +32,26 @@ class BridgePort final : public DevicePort {
   BridgePort(const BridgePort&) = delete;
   BridgePort& operator=(const BridgePort&) = delete;
 
-  /// Makes the socket; waits for nobody. Throws Error where another program listens there, where something
-  /// else has the name, or the folder is not private.
+  /// Creates the socket without waiting for a bridge. Throws Error if another program listens there,
+  /// something else has the name, or the folder is not private.
   void open() override;
 
-  /// Lost: the partner is gone or was silent for too long, or it says that its device has a fault. Nothing,
-  /// and not lost, while there was no partner yet.
+  /// Returns `lost` if the partner is gone, was silent for too long, or reports a fault of its device;
+  /// `nothing`, not `lost`, before there is a partner.
   ReadResult read(DeviceState& state) noexcept override;
 
-  /// True while there is nobody to tell: it is read that says lost.
+  /// True also while there is no partner; only read reports a loss.
   bool write(const DeviceCommand& command, const DeviceState& state) noexcept override;
 
-  /// Tells the partner to show no force, disconnects and removes the socket.
+  /// Sends the partner a command of zero force, disconnects and removes the socket.
   void close() noexcept override;
 
-  /// Infinite before the partner has said any. From any thread.
+  /// Limits stated by the partner; infinite before its first state. May be called from any thread.
   [[nodiscard]] DeviceLimits limits() const noexcept override;
 
   [[nodiscard]] std::string refusals() const override;
 
-  /// "bridge:" and the socket.
+  /// "bridge:" and the path of the socket.
   [[nodiscard]] std::string name() const override;
 
  private:
@@ -64,12 +64,12 @@ class BridgePort final : public DevicePort {
   BridgeOptions options_;
   FileDescriptor listener_;
 
-  // Of the thread that reads.
+  // Used by the reading thread alone.
   FileDescriptor bridge_;
-  std::int64_t heard_ = 0;  // when it connected, or something was taken [ns]
+  std::int64_t heard_ = 0;  // time of the connection or of the last accepted state [ns]
 
-  // Of both threads and of who asks.
-  std::atomic<int> partner_ = -1;  // the bridge's descriptor once something was taken
+  // Used by both threads and by callers of limits() and refusals().
+  std::atomic<int> partner_ = -1;  // descriptor of the bridge once a state has been accepted
   std::array<std::atomic<double>, 5> limits_;
   std::array<std::atomic<std::uint64_t>, reasons> refused_{};
 };

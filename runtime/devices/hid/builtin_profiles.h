@@ -1,4 +1,4 @@
-// The profiles that palpate-runtime has in itself.
+// Device profiles built into palpate-runtime.
 #pragma once
 
 #include <span>
@@ -6,13 +6,13 @@
 
 namespace palpate {
 
-/// A file of runtime/devices/hid/profiles, as it was when the program was built.
+/// File of runtime/devices/hid/profiles at build time.
 struct BuiltinProfile {
-  std::string_view name;  ///< of the file, without .toml
+  std::string_view name;  ///< file name without .toml
   std::string_view text;
 };
 
-/// All of them, by name.
+/// Returns all built-in profiles, sorted by name.
 [[nodiscard]] std::span<const BuiltinProfile> builtin_profiles() noexcept;
 
 }  // namespace palpate

@@ -16,8 +16,8 @@
 namespace palpate {
 namespace {
 
-/// What the child is told, in one piece: a pipe keeps writes of up to PIPE_BUF bytes whole. Without reports
-/// there is nothing to do, which is the goodbye, too.
+/// Message to the child, sent in one write: a pipe keeps writes of up to PIPE_BUF bytes whole. A message
+/// without reports leaves the child nothing to do; it is also the goodbye.
 struct Message {
   static constexpr std::size_t most_reports = 8;
   static constexpr std::size_t room = 64;
@@ -34,9 +34,9 @@ void tell(int pipe, const Message& message) noexcept {
   }
 }
 
-// --- the child: only functions that signal handlers may call, as other threads' locks are not there ---
+// --- the child: async-signal-safe functions alone, since locks of other threads are not released here ---
 
-/// False at the end.
+/// Reads a message; false at the end of the pipe.
 bool receive(int pipe, Message& message) noexcept {
   auto* const bytes = reinterpret_cast<unsigned char*>(&message);
   std::size_t have = 0;
@@ -52,7 +52,7 @@ void show_no_force(const Message& device) noexcept {
   const int file = open(device.path.data(), O_WRONLY | O_CLOEXEC);
   if (file < 0) return;
   for (std::size_t k = 0; k < device.count; ++k) {
-    // Twice, as one may be lost; an error leaves nothing better to do than the next report.
+    // Twice, as one may be lost. After an error the next report is still worth sending.
     for (int time = 0; time < 2; ++time) {
       if (write(file, device.reports[k].data(), device.sizes[k]) < 0 && errno == EINTR) --time;
     }
@@ -60,12 +60,12 @@ void show_no_force(const Message& device) noexcept {
   close(file);
 }
 
-/// Leaves the terminal and the files of the process that it guards: whoever waits for the end of that one's
-/// output does not wait for the child. Closes the pipe's other end with them.
+/// Detaches from the terminal and the files of the guarded process, so that a program that waits for the end
+/// of its output does not wait for the child. Closes the other end of the pipe too.
 void detach(int& pipe) noexcept {
   setsid();
   constexpr int own = 3;
-  pipe = fcntl(pipe, F_DUPFD, own);  // it may be one of the first three, where the parent had closed them
+  pipe = fcntl(pipe, F_DUPFD, own);  // it may be one of the first three if the parent had closed them
   const int null = open("/dev/null", O_RDWR);
   for (int file = 0; file < own; ++file) {
     if (null >= 0) {

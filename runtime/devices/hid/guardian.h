@@ -1,4 +1,4 @@
-// A child process that takes the force off a device when this process dies.
+// Child process that switches off a device's force when this process dies.
 #pragma once
 
 #include <sys/types.h>
@@ -10,26 +10,27 @@
 
 namespace palpate {
 
-/// Waits on a pipe that only this process can write to. When the pipe ends without a goodbye, because this
-/// process was killed, crashed or was aborted, it opens the device that it was told of last and writes its
-/// reports of no force. It takes no signal but SIGKILL, and has a session of its own.
+/// Waits on a pipe that only this process can write to. If the pipe ends without a goodbye, because this
+/// process was killed, crashed or was aborted, the child opens the last device named to it and writes that
+/// device's reports for zero force. It accepts no signal except SIGKILL, and has a session of its own.
 ///
-/// What it cannot help against: a process that hangs, and a machine that stops. The device's own watchdog
-/// is for these.
+/// It cannot help against a process that hangs or a machine that stops; the device's own watchdog covers
+/// these.
 class Guardian {
  public:
-  /// Forks: before the program has a second thread. Throws Error when that fails.
+  /// Forks; call it before the program has a second thread. Throws Error if the fork fails.
   Guardian();
-  /// Says goodbye and waits for the child's end.
+  /// Sends the goodbye and waits for the child to exit.
   ~Guardian();
   Guardian(const Guardian&) = delete;
   Guardian& operator=(const Guardian&) = delete;
 
-  /// From now on `path`, with the output reports after which there is no force (at most 8 of at most 64
-  /// bytes, as write(2) on a hidraw device takes them; more are left out). Without reports as release().
+  /// Guards `path` from now on. `reports`: output reports after which there is no force (at most 8 of at most
+  /// 64 bytes, as write(2) on a hidraw device takes them; others are left out). Without reports, the same as
+  /// release().
   void guard(const std::string& path, std::span<const std::vector<std::uint8_t>> reports) noexcept;
 
-  /// There is nothing to guard: the device was closed without force.
+  /// Guards nothing any more: the device was closed without force.
   void release() noexcept;
 
  private:

@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-/// What one count of all three encoders together moves the handle at most, where the position is 0 [m].
+/// Largest displacement of the handle for one count of all three encoders, at position 0 [m], per axis.
 Vec3 resolution(const ArmConstants& arm) {
   const Vec3 none = joint_angles(arm, {});
   const Vec3 step = (joint_angles(arm, {1, 1, 1, 0, 0, 0}) - none).cwiseAbs();

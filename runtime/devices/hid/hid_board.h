@@ -1,4 +1,4 @@
-// A home-made board on the wire.
+// HID protocol of a home-made board.
 #pragma once
 
 #include <atomic>
@@ -9,23 +9,23 @@
 
 namespace palpate {
 
-/// Counts its own reports. A report whose number is not ahead of the last one's is old: it is dropped.
+/// The board numbers its reports. A report whose number is not ahead of the last one's is old and is dropped.
 class HidBoard : public HidProtocol {
  public:
-  /// Throws Error when the descriptor has no input report of 3 to 6 axes.
+  /// Throws Error if the descriptor has no input report of 3 to 6 axes.
   HidBoard(const DeviceLimits& limits, const HidReportDescriptor& descriptor, std::string device,
            std::uint32_t last);
 
   [[nodiscard]] std::size_t input_bytes() const noexcept override { return board_input_bytes(axes_); }
-  /// Asks for the feature report: limits and the unit of force.
+  /// Reads the feature report: limits and unit of force.
   void start(HidDevice& device) override;
   bool take(std::span<const std::uint8_t> report) noexcept override;
   bool tell(bool heard, std::int64_t now, DeviceState& state) noexcept override;
-  /// The board's own number of the report that `state` came from goes back with the force.
+  /// Sends the force together with the board's own number of the report behind `state`.
   void encode(const DeviceCommand& command, const DeviceState& state,
               OutputReports& reports) noexcept override;
   [[nodiscard]] std::vector<OutputReport> zero() const override;
-  /// The smaller ones of the profile's and the board's.
+  /// Returns the smaller of the profile's and the board's limits.
   [[nodiscard]] DeviceLimits limits() const override { return limits_; }
 
  private:
@@ -36,8 +36,8 @@ class HidBoard : public HidProtocol {
   std::uint32_t last_;
   BoardInput input_;
   bool heard_anything_ = false;
-  /// State's sequence less the board's, which begins anew when it is plugged in again. Set by the first
-  /// report.
+  /// Sequence number of the state minus the board's, which restarts when it is plugged in again. Set by the
+  /// first report.
   std::atomic<std::uint32_t> ahead_ = 0;
   VelocityEstimator velocity_;
 };

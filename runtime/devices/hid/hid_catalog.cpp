@@ -18,7 +18,7 @@
 namespace palpate {
 namespace {
 
-/// UTF-8 of what hidapi has in wide characters, which are Unicode on Linux.
+/// Converts hidapi's wide characters, which are Unicode on Linux, to UTF-8.
 std::string utf8(const wchar_t* text) {
   std::string result;
   for (; text != nullptr && *text != L'\0'; ++text) {
@@ -43,7 +43,7 @@ std::string utf8(const wchar_t* text) {
   return result;
 }
 
-/// Opens the device for a moment, which moves nothing.
+/// Opens the device briefly, which moves nothing, and returns errno; 0 if it could be opened.
 int access_of(const std::string& path) {
   const int file = open(path.c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) return errno;
@@ -83,7 +83,7 @@ std::vector<AttachedDevice> attached_devices(const std::filesystem::path& sys) {
   hid_device_info* const all = hid_enumerate(0, 0);
   for (const hid_device_info* info = all; info != nullptr; info = info->next) {
     const std::string path = info->path == nullptr ? "" : info->path;
-    // A device with several application collections comes once for each.
+    // A device with several application collections is listed once per collection.
     if (path.empty() ||
         std::ranges::any_of(result, [&](const AttachedDevice& device) { return device.path == path; })) {
       continue;

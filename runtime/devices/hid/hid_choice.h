@@ -1,4 +1,4 @@
-// Which of the attached HID devices is played with, and by which profile.
+// Choice of an attached HID device and its profile.
 #pragma once
 
 #include <string>
@@ -9,19 +9,20 @@
 
 namespace palpate {
 
-/// A profile and what a person writes to choose it: a built-in one's name, or a file.
+/// Profile with the key that selects it: a built-in name or a file.
 struct NamedProfile {
   std::string key;
   DeviceProfile profile;
 };
 
-/// The built-in ones.
+/// Returns the built-in profiles.
 [[nodiscard]] std::vector<NamedProfile> known_profiles();
 
-/// The built-in one of that name, or that of a file. Throws Error when it is neither, or the file is wrong.
+/// Returns the built-in profile of that name, or reads the file. Throws Error if it is neither, or the file
+/// is invalid.
 [[nodiscard]] NamedProfile find_profile(const std::string& name_or_file);
 
-/// The profiles that fit, in their order. Point into `profiles`.
+/// Returns the profiles that fit the device, in their order, as pointers into `profiles`.
 [[nodiscard]] std::vector<const NamedProfile*> fitting_profiles(const AttachedDevice& device,
                                                                 const std::vector<NamedProfile>& profiles);
 
@@ -30,10 +31,10 @@ struct HidChoice {
   DeviceProfile profile;
 };
 
-/// `text` says which device: "" is the only one that a profile fits, else "VVVV:PPPP" (vendor and product in
-/// hexadecimal numbers), "/dev/hidrawN" or a serial number. `profiles`: those that come into question, one
-/// where the user named it. Throws Error that lists what there is and says how to choose: nothing is
-/// attached, it is not there, no profile fits, several devices, several profiles, no access.
+/// Chooses a device and a profile. `text` selects the device: "" means the only one with a fitting profile,
+/// otherwise "VVVV:PPPP" (vendor and product in hexadecimal), "/dev/hidrawN" or a serial number. `profiles`:
+/// candidates; a single one if the user named it. Throws Error that lists the choices with a hint if nothing
+/// is attached, the device is missing, no profile fits, several devices or profiles fit, or access is denied.
 [[nodiscard]] HidChoice choose_hid_device(const std::vector<AttachedDevice>& attached,
                                           const std::vector<NamedProfile>& profiles, const std::string& text);
 

@@ -1,4 +1,4 @@
-// An open HID device, through hidapi.
+// Open HID device, through hidapi.
 #pragma once
 
 #include <cstdint>
@@ -6,31 +6,32 @@
 #include <span>
 #include <string>
 
-struct hid_device_;  // hidapi's
+struct hid_device_;  // of hidapi
 
 namespace palpate {
 
-/// Owns hidapi's device. One thread may read while another one writes; everything else is for one thread.
+/// Owner of hidapi's device. One thread may read while another one writes; all other calls are for one
+/// thread.
 ///
-/// hidapi keeps the text of the last error in the device, without a lock (0.13.1): each call frees what the
-/// last one left. Therefore a thread that was told of an error must not touch the device again until the
-/// other one has stopped, and nobody asks for the text meanwhile.
+/// hidapi keeps the text of the last error in the device without a lock (0.13.1): each call frees the
+/// previous text. After an error a thread must therefore not touch the device until the other thread has
+/// stopped, and the text must not be queried in the meantime.
 class HidDevice {
  public:
-  /// Throws Error when `path` cannot be opened.
+  /// Throws Error if `path` cannot be opened.
   explicit HidDevice(const std::string& path);
 
-  /// Waits for a report for at most `wait` ms. How many bytes it has, 0 when there was none, -1 on an error,
-  /// which an unplugged device is.
+  /// Waits at most `wait` ms for a report. Returns its size in bytes, 0 if there was none, -1 on an error,
+  /// such as an unplugged device.
   [[nodiscard]] int read(std::span<std::uint8_t> report, int wait) noexcept;
 
-  /// Sends an output report: its id, 0 where reports have none, then what is in it.
+  /// Sends an output report: its id (0 for unnumbered reports), then its contents. False on an error.
   [[nodiscard]] bool write(std::span<const std::uint8_t> report) noexcept;
 
-  /// Sends a feature report, id first.
+  /// Sends a feature report, id first. False on an error.
   [[nodiscard]] bool set_feature(std::span<const std::uint8_t> report) noexcept;
 
-  /// Asks for the feature report whose id report[0] is. How many bytes it has, with its id; -1 on an error.
+  /// Reads the feature report with id report[0]. Returns its size in bytes including the id, -1 on an error.
   [[nodiscard]] int get_feature(std::span<std::uint8_t> report) noexcept;
 
  private:

@@ -11,10 +11,10 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t repeat_after = 100'000'000;  // ns
-constexpr std::int64_t still_after = 20'000'000;    // ns; no stick that moves is slower
+constexpr std::int64_t still_after = 20'000'000;    // ns; without a report for longer it is at rest
 constexpr std::int64_t millisecond = 1'000'000;     // ns
 
-/// Travel of one count of each axis [m].
+/// Travel of the handle per count of each axis [m].
 Vec3 resolution(const PidLayout& layout, const PidConstants& constants) {
   Vec3 result = Vec3::Zero();
   for (std::size_t k = 0; k < pid_axes; ++k) {

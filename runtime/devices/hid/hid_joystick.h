@@ -1,4 +1,4 @@
-// A force-feedback joystick on the wire.
+// HID protocol of a force-feedback joystick.
 #pragma once
 
 #include "runtime/devices/hid/hid_protocol.h"
@@ -7,30 +7,30 @@
 
 namespace palpate {
 
-/// Two constant effects play without end, so that what was told last goes on when nobody tells anything: such
-/// a device needs the guardian most. A report that equals the one before it is sent only each 0.1 s, as the
-/// bus carries one a millisecond.
+/// Two constant effects play without end, so the last force continues if no new one is sent: such a device
+/// needs the guardian most. A report equal to the one before is sent only every 0.1 s, as the bus carries one
+/// per millisecond.
 ///
-/// Many sticks report only what has changed. One that rests is not silent, so its last report is told again,
-/// with a new number, until it speaks: that it is gone is seen by reads and writes that fail, and that it
-/// hangs by numbers that are frozen while a force is shown.
+/// Many sticks report changes only, so one at rest is not faulty: its last report is repeated under a new
+/// number until the next one arrives. A lost stick is detected by reads and writes that fail, a hung one by
+/// frozen numbers while a force is displayed.
 class HidJoystick : public HidProtocol {
  public:
   HidJoystick(const PidConstants& constants, const DeviceLimits& limits, const PidLayout& layout,
               std::string device, std::uint32_t last);
 
   [[nodiscard]] std::size_t input_bytes() const noexcept override;
-  /// Shorter than a silence from which the force fades.
+  /// Waiting time, shorter than the silence from which the force fades [ms].
   [[nodiscard]] int wait() const noexcept override { return 3; }
-  /// PID's conversation. Throws Error that says what the device did not do.
+  /// Runs the PID start sequence. Throws Error with the step that the device failed.
   void start(HidDevice& device) override;
   bool take(std::span<const std::uint8_t> report) noexcept override;
-  /// False only before the first report. A report's number is ahead of the last one's by the milliseconds
-  /// between, as a speed must not be measured from a repetition to it.
+  /// False only before the first report. The sequence number advances by the milliseconds between two
+  /// reports, so that no speed is computed from a repetition to a report.
   bool tell(bool heard, std::int64_t now, DeviceState& state) noexcept override;
   void encode(const DeviceCommand& command, const DeviceState& state,
               OutputReports& reports) noexcept override;
-  /// Forces of 0, both effects stopped, and the device reset.
+  /// Returns reports that set both forces to 0, stop both effects and reset the device.
   [[nodiscard]] std::vector<OutputReport> zero() const override;
   [[nodiscard]] DeviceLimits limits() const override { return limits_; }
 
@@ -43,8 +43,8 @@ class HidJoystick : public HidProtocol {
   PidSequence effects_;
   PidInput input_;
   VelocityEstimator velocity_;
-  DeviceState state_;       // told last
-  std::int64_t heard_ = 0;  // when; 0: not yet [ns]
+  DeviceState state_;       // state returned last
+  std::int64_t heard_ = 0;  // time of the last report; 0: none yet [ns]
 
   struct Sent {
     PidReport report;

@@ -14,8 +14,8 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t longest_input = 64;           // bytes of a full-speed interrupt transfer
-constexpr int most_drained = 64;                    // Linux keeps as many reports
-constexpr std::int64_t longest_write = 20'000'000;  // of a device that is well [ns]
+constexpr int most_drained = 64;                    // Linux queues as many reports
+constexpr std::int64_t longest_write = 20'000'000;  // of a working device [ns]
 
 }  // namespace
 
@@ -84,9 +84,9 @@ void HidPort::open() {
 
 DevicePort::ReadResult HidPort::read(DeviceState& state) noexcept {
   if (!device_ || read_failed_) return ReadResult::lost;
-  // Exactly the longest report of interest is asked for. A hidraw device gives one report a read, whatever is
-  // asked for, and a shorter or cut-off one does not decode. The pseudo-terminals by which tests emulate a
-  // device give all that waits, one report behind the other: asked for one, they give one.
+  // Requests exactly the longest report of interest. A hidraw device returns one report per read whatever the
+  // requested size, and a shorter or truncated one fails to decode. The pseudo-terminals that emulate devices
+  // in tests return all pending bytes; with this size they return one report.
   std::array<std::uint8_t, longest_input> room;
   const std::span<std::uint8_t> buffer(room.data(), protocol_->input_bytes());
   bool heard = false;
@@ -130,7 +130,7 @@ bool HidPort::write(const DeviceCommand& command, const DeviceState& state) noex
 void HidPort::close() noexcept {
   if (!device_) return;
   for (const OutputReport& report : zero_) {
-    // Twice, as one may be lost. That the device is lost itself is no news here.
+    // Twice, as one may be lost. Failure is ignored: the device is being closed anyway.
     static_cast<void>(device_->write(report));
     static_cast<void>(device_->write(report));
   }

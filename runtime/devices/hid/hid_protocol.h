@@ -1,4 +1,4 @@
-// What a kind of HID device says and expects; HidPort has the wire.
+// Protocol of a kind of HID device, without the connection, which HidPort has.
 #pragma once
 
 #include <algorithm>
@@ -13,14 +13,15 @@
 
 namespace palpate {
 
-/// An output report as hid_write and a hidraw device take it: the report id, 0 where reports have none, then
-/// what is in it.
+/// Output report as hid_write and a hidraw device take it: the report id (0 for unnumbered reports), then its
+/// contents.
 using OutputReport = std::vector<std::uint8_t>;
 
-/// Output reports of one command, in order, without the heap.
+/// Output reports of one command, in order, in fixed memory.
 class OutputReports {
  public:
-  /// One that does not fit is left out; the kinds below have reports of at most 64 bytes, and two a command.
+  /// Appends a report. One that does not fit is dropped; the protocols have at most two reports per command,
+  /// of at most 64 bytes.
   void add(std::span<const std::uint8_t> report) noexcept {
     if (count_ == most || report.size() > room) return;
     std::copy(report.begin(), report.end(), bytes_[count_].begin());
@@ -41,33 +42,33 @@ class OutputReports {
   std::size_t count_ = 0;
 };
 
-/// One for each time that a device is opened. `take` and `tell` belong to the thread that reads, `encode` to
-/// the one that writes.
+/// Protocol of one kind of device; a new object for each opening. `take` and `tell` belong to the reading
+/// thread, `encode` to the writing thread.
 class HidProtocol {
  public:
   virtual ~HidProtocol() = default;
 
-  /// The longest input report that is of interest, with its id where reports have one.
+  /// Length of the longest input report of interest, including the id if reports have one [byte].
   [[nodiscard]] virtual std::size_t input_bytes() const noexcept = 0;
 
-  /// How long to wait for a report [ms].
+  /// Waiting time for a report [ms].
   [[nodiscard]] virtual int wait() const noexcept { return 10; }
 
-  /// What must be said and asked before reports and forces flow. Throws Error.
+  /// Exchanges the messages needed before reports and forces flow. Throws Error.
   virtual void start(HidDevice& device) = 0;
 
-  /// Takes note of an input report; false where it makes no sense.
+  /// Decodes and stores an input report; false if it is invalid.
   virtual bool take(std::span<const std::uint8_t> report) noexcept = 0;
 
-  /// Fills pose, buttons, velocity and sequence at `now` [ns] from what was taken; `heard`: something was,
-  /// since the last call. False when there is nothing new to tell.
+  /// Writes pose, buttons, velocity and sequence number at `now` [ns] to `state`. `heard`: a report was taken
+  /// since the last call. False if there is no new state.
   virtual bool tell(bool heard, std::int64_t now, DeviceState& state) noexcept = 0;
 
-  /// The reports that show `command` with the device at `state`.
+  /// Encodes the reports that display `command` with the device at `state`.
   virtual void encode(const DeviceCommand& command, const DeviceState& state,
                       OutputReports& reports) noexcept = 0;
 
-  /// The reports after which there is no force, from any state; none where the device shows none.
+  /// Returns the reports after which there is no force, from any state; none for a device without force.
   [[nodiscard]] virtual std::vector<OutputReport> zero() const = 0;
 
   [[nodiscard]] virtual DeviceLimits limits() const = 0;

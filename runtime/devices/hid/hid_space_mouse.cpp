@@ -12,7 +12,7 @@ bool HidSpaceMouse::take(std::span<const std::uint8_t> report) noexcept {
 }
 
 bool HidSpaceMouse::tell(bool /*heard*/, std::int64_t now, DeviceState& state) noexcept {
-  constexpr std::int64_t longest = 20'000'000;  // a reader that was held up does not jump [ns]
+  constexpr std::int64_t longest = 20'000'000;  // limits the jump after a delayed read [ns]
   const std::int64_t passed = advanced_ == 0 ? 0 : std::min(now - advanced_, longest);
   advanced_ = now;
   state = mouse_.advance(1e-9 * static_cast<double>(passed));

@@ -1,4 +1,4 @@
-// A SpaceMouse on the wire.
+// HID protocol of a SpaceMouse.
 #pragma once
 
 #include "runtime/devices/hid/hid_protocol.h"
@@ -6,9 +6,9 @@
 
 namespace palpate {
 
-/// Silent while its cap rests, which is not a fault: there is a state each millisecond, whether it said
-/// something or not. It shows no force, whatever its profile says, so nobody waits for a hand that moves by
-/// it. That it is gone is seen by the read that fails.
+/// Sends nothing while the cap rests, which is not a fault: a state is produced every millisecond, with or
+/// without a report. It displays no force, whatever its profile states, so the engagement rule does not wait
+/// for the hand. A lost device is detected by the read that fails.
 class HidSpaceMouse : public HidProtocol {
  public:
   HidSpaceMouse(const SpaceMouseConstants& constants, const DeviceLimits& limits, std::uint32_t last) noexcept
@@ -31,7 +31,7 @@ class HidSpaceMouse : public HidProtocol {
   DeviceLimits limits_;
   std::uint32_t sequence_;
   SpaceMouse mouse_;
-  std::int64_t advanced_ = 0;  // until when; 0: not yet [ns]
+  std::int64_t advanced_ = 0;  // time up to which the pose was integrated; 0: not yet [ns]
 };
 
 }  // namespace palpate

@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// The longest report of a type that the descriptor has, with its id.
+/// Length of the longest report of a type in the descriptor, including its id [byte].
 int longest(const HidReportDescriptor& descriptor, HidReportType type) {
   int bytes = 0;
   for (const HidReportDescriptor::ReportSize& report : descriptor.sizes) {

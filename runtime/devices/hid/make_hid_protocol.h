@@ -1,4 +1,4 @@
-// Chooses the protocol of a device by its profile.
+// Factory of HID protocols.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace palpate {
 
-/// The protocol of a profile's kind. `device` is what messages call it. `last` is the last sequence number of
-/// the time before. Throws Error when the report descriptor is not that of such a device.
+/// Returns the protocol of the profile's kind. `device`: name in messages. `last`: sequence number of the
+/// last state before this opening. Throws Error if the report descriptor does not belong to such a device.
 [[nodiscard]] std::unique_ptr<HidProtocol> make_hid_protocol(const DeviceProfile& profile,
                                                              const HidReportDescriptor& descriptor,
                                                              const std::string& device, std::uint32_t last);

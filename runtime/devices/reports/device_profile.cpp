@@ -14,9 +14,9 @@
 namespace palpate {
 namespace {
 
-constexpr int longest_report = 4096;  // bytes; of Linux's hidraw
+constexpr int longest_report = 4096;  // bytes; limit of Linux's hidraw
 
-/// A usage as [page, number].
+/// Reads a usage given as [page, number].
 std::optional<HidUsage> read_usage(const TomlTable& table, std::string_view key) {
   if (!table.has(key)) return std::nullopt;
   const auto pair = table.integers(key, 2, 0, 0xFFFF);
@@ -120,7 +120,7 @@ PidConstants read_pid(const TomlTable& table) {
   return constants;
 }
 
-/// Kinds of profiles, and the table that each has.
+/// Kind of profile and the name of its table.
 struct Kind {
   std::string_view name;
   std::string_view table;  // empty: none

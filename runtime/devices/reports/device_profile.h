@@ -1,4 +1,4 @@
-// What Palpate knows of a device before it is opened: a text file that a user can copy and edit.
+// Profile of a device, known before it is opened: a text file that users can copy and edit.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace palpate {
 
-/// What an operating system says of an attached HID device.
+/// Identity of an attached HID device, as the operating system reports it.
 struct DeviceId {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
@@ -26,29 +26,29 @@ struct DeviceId {
   std::span<const HidUsage> collections{};  ///< HidReportDescriptor::collections
 };
 
-/// What a device must have; what is empty may be anything.
+/// Properties that a device must have; an empty one matches any device.
 struct DeviceMatch {
   std::optional<std::uint16_t> vendor{};
   std::optional<std::uint16_t> product{};
   std::optional<HidUsage> usage{};
-  std::optional<HidUsage> collection{};  ///< somewhere in its report descriptor
+  std::optional<HidUsage> collection{};  ///< any collection of its report descriptor
 
   [[nodiscard]] bool fits(const DeviceId& device) const noexcept;
 };
 
-/// Longest reports in bytes, with the report id where reports have one; 0: the descriptor says.
+/// Longest reports [byte], including the report id if reports have one; 0: taken from the descriptor.
 struct ReportLengths {
   int input = 0;
   int output = 0;
   int feature = 0;
 };
 
-/// A home-made board says all that there is to know.
+/// Empty: a home-made board states all its constants itself.
 struct BoardConstants {};
 
 struct DeviceProfile {
   std::string name;
-  std::vector<DeviceMatch> matches;  ///< any of them; at least one
+  std::vector<DeviceMatch> matches;  ///< alternatives, at least one
   ReportLengths reports;
   DeviceLimits limits;
   std::variant<ArmConstants, SpaceMouseConstants, PidConstants, BoardConstants> kind;
@@ -56,10 +56,10 @@ struct DeviceProfile {
   [[nodiscard]] bool fits(const DeviceId& device) const noexcept;
 };
 
-/// Reads a profile (TOML). Throws Error that names file, line and key, and says what to do.
+/// Reads a profile (TOML). Throws Error that names file, line and key, with a hint.
 [[nodiscard]] DeviceProfile read_device_profile(const std::filesystem::path& file);
 
-/// Reads a profile from `text`; `name` stands for the file in messages.
+/// Parses a profile from `text`; `name` stands for the file in messages.
 [[nodiscard]] DeviceProfile parse_device_profile(std::string_view text, const std::string& name);
 
 }  // namespace palpate

@@ -8,14 +8,14 @@
 namespace palpate {
 namespace {
 
-// Bounds of Linux (include/linux/hid.h), which has refused the device before we see it.
+// Bounds of Linux (include/linux/hid.h), which refuses larger devices itself.
 constexpr std::size_t largest_descriptor = 4096;     // bytes
 constexpr std::uint32_t largest_report = 8 * 16384;  // bits
 constexpr std::uint32_t largest_element = 256;       // bits
 constexpr std::uint32_t most_usages = 12288;
 constexpr std::size_t deepest = 64;  // collections, pushed states
 
-/// Sections 6.2.2.4 (main), 6.2.2.7 (global) and 6.2.2.8 (local): tag and type of the prefix, without the
+/// Item prefixes of sections 6.2.2.4 (main), 6.2.2.7 (global) and 6.2.2.8 (local): tag and type, without the
 /// size.
 enum Item : std::uint8_t {
   input_item = 0x80,
@@ -41,7 +41,7 @@ constexpr std::uint32_t application_collection = 1;
 constexpr std::uint32_t constant_flag = 1;
 constexpr std::uint32_t variable_flag = 2;
 
-/// The number of an item: 0, 1, 2 or 4 bytes.
+/// Data of an item: 0, 1, 2 or 4 bytes.
 struct Data {
   std::uint32_t bits = 0;
   std::size_t size = 0;
@@ -60,7 +60,7 @@ struct Globals {
   std::uint8_t id = 0;
 };
 
-/// Usages first to last; without a page of their own they take that of the main item.
+/// Range of usages, first to last; without a page of their own they take that of the main item.
 struct UsageRange {
   Data first, last;
 };
@@ -130,7 +130,7 @@ class Parser {
     }
   }
 
-  /// An item that holds until the next of its kind.
+  /// Applies an item that holds until the next of its kind.
   void global_item(std::uint8_t tag, Data data) {
     switch (tag) {
       case usage_page_item:
@@ -165,7 +165,7 @@ class Parser {
         pushed_.pop_back();
         return;
       default:
-        return;  // physical range, unit, designators, strings, and what later versions may add
+        return;  // physical range, unit, designators, strings, and additions of later versions
     }
   }
 
@@ -218,7 +218,7 @@ class Parser {
     field.bits = globals_.size;
     field.count = globals_.count;
     field.logical_min = globals_.minimum.as_signed();
-    // Devices write 25 FF for 255: where nothing is negative, the maximum is not either.
+    // Devices write 25 FF for 255: if the minimum is not negative, neither is the maximum.
     field.logical_max = field.logical_min < 0 ? globals_.maximum.as_signed() : globals_.maximum.bits;
     field.usages = usages();
     field.collections = collections_;
@@ -269,7 +269,7 @@ bool is_usable(const HidField& field) noexcept {
   return field.bits >= 1 && field.bits <= 32;
 }
 
-/// Which of the field's numbers the usage is, if any.
+/// Returns the index of the usage in the field, if it has one.
 std::optional<std::uint32_t> place_of(const HidField& field, HidUsage usage) noexcept {
   const auto found = std::find(field.usages.begin(), field.usages.end(), usage);
   if (found == field.usages.end()) return std::nullopt;

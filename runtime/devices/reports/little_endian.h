@@ -1,4 +1,4 @@
-// Numbers in reports: low byte first, negative ones in two's complement.
+// Numbers in reports: little-endian, two's complement.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// The number at byte `at`, which the caller knows to be there.
+/// Reads the number at byte `at`; the caller ensures that the bytes exist.
 template <class Number>
 [[nodiscard]] constexpr Number read_number(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
   std::make_unsigned_t<Number> value = 0;
@@ -18,7 +18,7 @@ template <class Number>
   return static_cast<Number>(value);
 }
 
-/// Puts the number at byte `at`.
+/// Writes the number at byte `at`; the caller ensures that the bytes exist.
 template <class Number>
 constexpr void write_number(std::span<std::uint8_t> bytes, std::size_t at, Number number) noexcept {
   const auto value = static_cast<std::make_unsigned_t<Number>>(number);

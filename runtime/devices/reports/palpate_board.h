@@ -1,6 +1,6 @@
 // Palpate's own reports for home-made boards: any USB microcontroller that measures a handle and drives
-// motors. A board that says the descriptor below is found by its usage, whatever its ids. All numbers low
-// byte first.
+// motors. A board with the descriptor below is found by its usage, whatever its ids. All numbers are
+// little-endian.
 #pragma once
 
 #include <array>
@@ -21,14 +21,15 @@ constexpr std::uint8_t board_version = 1;
 constexpr int least_board_axes = 3;
 constexpr int most_board_axes = 6;
 
-/// The report descriptor of a board with 3 to 6 axes.
+/// Returns the report descriptor of a board with 3 to 6 axes.
 [[nodiscard]] std::vector<std::uint8_t> board_report_descriptor(int axes);
 
 // --- input report 1: sequence u32, axes i32 (3 to 6), buttons u16 ---
 
-/// x, y, z [um], then a rotation vector (axis times angle) [urad] as far as there are axes.
+/// Position x, y, z [um], then as many components of a rotation vector (axis times angle) [urad] as there are
+/// axes.
 struct BoardInput {
-  std::uint32_t sequence = 0;  ///< one more in each report
+  std::uint32_t sequence = 0;  ///< incremented with each report
   int axes = least_board_axes;
   std::array<std::int32_t, most_board_axes> values{};
   std::uint16_t buttons = 0;  ///< bit k: button k is down
@@ -37,10 +38,10 @@ constexpr std::size_t board_input_bytes(int axes) noexcept {
   return 1 + 4 + 4 * static_cast<std::size_t>(axes) + 2;
 }
 
-/// Empty for another id or length, a place beyond 10 m and an angle beyond 2 pi.
+/// Decodes a report. Empty for a wrong id or length, a position beyond 10 m or an angle beyond 2 pi.
 [[nodiscard]] std::optional<BoardInput> decode_board_input(std::span<const std::uint8_t> report) noexcept;
 
-/// In SI units; without velocity and time.
+/// Converts to SI units; without velocity and time.
 [[nodiscard]] DeviceState board_state(const BoardInput& input) noexcept;
 
 // --- output report 2: sequence u32, forces i16 (x, y, z) ---
@@ -48,8 +49,8 @@ constexpr std::size_t board_input_bytes(int axes) noexcept {
 constexpr std::size_t board_force_bytes = 1 + 4 + 3 * 2;
 
 struct BoardForce {
-  std::uint32_t sequence = 0;            ///< of the input report that it answers
-  std::array<std::int16_t, 3> counts{};  ///< on the hand, in the board's unit
+  std::uint32_t sequence = 0;            ///< sequence number of the input report that it answers
+  std::array<std::int16_t, 3> counts{};  ///< force on the hand in the board's unit
 };
 [[nodiscard]] std::array<std::uint8_t, board_force_bytes> encode_board_force(
     const BoardForce& force) noexcept;
@@ -59,11 +60,11 @@ struct BoardForce {
 
 constexpr std::size_t board_feature_bytes = 1 + 1 + 1 + 2 + 5 * 4;
 
-/// What a board says of itself. Where a limit is 0 it says nothing.
+/// Properties that a board reports. A limit of 0 is not stated.
 struct BoardFeature {
   int axes = least_board_axes;
-  std::uint16_t watchdog = 0;          ///< after so long without a force it shows none [ms]; 1 to 1000
-  std::uint32_t force_unit = 0;        ///< one count of a force [uN]; from 1
+  std::uint16_t watchdog = 0;          ///< time without a force report until it shows none [ms]; 1 to 1000
+  std::uint32_t force_unit = 0;        ///< force per count [uN]; at least 1
   std::uint32_t max_force = 0;         ///< [mN]
   std::uint32_t max_stiffness = 0;     ///< [N/m]
   std::uint32_t max_damping = 0;       ///< [mN s/m]
@@ -72,10 +73,10 @@ struct BoardFeature {
   [[nodiscard]] DeviceLimits limits() const noexcept;
 };
 
-/// Empty for another id, length or version, and for numbers outside the bounds above.
+/// Decodes a report. Empty for a wrong id, length or version, and for numbers outside the bounds above.
 [[nodiscard]] std::optional<BoardFeature> decode_board_feature(std::span<const std::uint8_t> report) noexcept;
 
-/// A force in the board's unit, and how much of it that is.
+/// Force in the board's unit, and the fraction of the request that it amounts to.
 struct BoardCounts {
   std::array<std::int16_t, 3> counts{};
   double shown = 1.0;  ///< as in Saturated

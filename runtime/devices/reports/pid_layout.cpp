@@ -66,7 +66,7 @@ class Finder {
     return checked(descriptor_.first_element(type, within), usage, name);
   }
 
-  /// What a report may have besides `other`, or not.
+  /// Finds an optional element in the report of `other`.
   [[nodiscard]] std::optional<HidElement> beside(const HidElement& other, const std::vector<HidUsage>& within,
                                                  HidUsage usage) const {
     auto found = descriptor_.element(other.type, within, usage);
@@ -78,7 +78,7 @@ class Finder {
     throw Error(what, device_, "it can be read as a joystick, but shows no constant forces by USB PID");
   }
 
-  /// Two parts of one report.
+  /// Checks that two elements are in the same report.
   void together(const HidElement& a, const HidElement& b, const char* name) const {
     if (a.report_id != b.report_id) fail(std::string(name) + " is not in one report");
   }

@@ -1,6 +1,6 @@
-// Where a force-feedback joystick keeps what a constant force needs (USB Device Class Definition for Physical
-// Interface Devices 1.0). Report ids differ from device to device: all is found by usage, none by id.
-// Usages also in torvalds/linux, drivers/hid/usbhid/hid-pidff.c.
+// Location of the numbers that a constant force needs in the reports of a force-feedback joystick (USB Device
+// Class Definition for Physical Interface Devices 1.0). Report ids differ between devices, so all are found
+// by usage. The usages are also in torvalds/linux, drivers/hid/usbhid/hid-pidff.c.
 #pragma once
 
 #include <array>
@@ -12,27 +12,27 @@
 namespace palpate {
 
 constexpr std::size_t pid_axes = 2;
-constexpr std::size_t pid_report_room = 64;  ///< of a full-speed interrupt transfer, with the report id
+constexpr std::size_t pid_report_room = 64;  ///< full-speed interrupt transfer, with the report id [byte]
 
 struct PidLayout {
   bool numbered = false;
 
-  std::array<HidElement, pid_axes> axes;              ///< input: x right, y to the user, in one report
-  std::array<std::optional<HidElement>, 32> buttons;  ///< of the same report
+  std::array<HidElement, pid_axes> axes;              ///< input: x right, y towards the user, in one report
+  std::array<std::optional<HidElement>, 32> buttons;  ///< input: buttons of the same report
 
   HidOption enable_actuators;  ///< output Device Control
   HidOption device_reset;
 
   HidOption create_constant;  ///< feature Create New Effect: a constant force
 
-  HidElement load_block;  ///< feature Block Load: the new effect's number
+  HidElement load_block;  ///< feature Block Load: number of the new effect
   HidOption load_success;
   HidOption load_full;
 
   HidElement effect_block;  ///< output Set Effect
   HidOption effect_constant;
   HidElement effect_duration;
-  HidElement effect_direction;  ///< one angle, where direction is enabled
+  HidElement effect_direction;  ///< a single angle, if direction is enabled
   std::optional<HidElement> effect_direction_enable;
   std::optional<HidElement> effect_gain;
 
@@ -45,7 +45,7 @@ struct PidLayout {
   std::optional<HidElement> loop_count;
 };
 
-/// Throws Error that names `device` and the usage that its descriptor lacks.
+/// Finds all elements. Throws Error that names `device` and the usage missing from its descriptor.
 [[nodiscard]] PidLayout find_pid_layout(const HidReportDescriptor& descriptor, const std::string& device);
 
 }  // namespace palpate

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double full_turn = 360.0;  // degrees
 
-/// Zeros, of the report that the element is in.
+/// Returns the report of the element, filled with zeros.
 PidReport report_of(const HidElement& element) noexcept {
   PidReport report;
   report.bytes[0] = element.report_id;
@@ -48,7 +48,7 @@ std::optional<PidInput> decode_pid_input(const PidLayout& layout,
     const auto range = static_cast<double>(axis.logical_max - axis.logical_min);
     if (range > 0.0) input.axes[k] = 2.0 * static_cast<double>(value - axis.logical_min) / range - 1.0;
   }
-  input.axes[1] = -input.axes[1];  // HID's y is to the user
+  input.axes[1] = -input.axes[1];  // HID's y points towards the user
   for (std::size_t k = 0; k < layout.buttons.size(); ++k) {
     if (layout.buttons[k] && read_element(*layout.buttons[k], report) != 0) input.buttons |= 1U << k;
   }

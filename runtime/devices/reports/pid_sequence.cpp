@@ -3,7 +3,7 @@
 namespace palpate {
 namespace {
 
-constexpr int most_tries = 60;  // of Block Load, as Linux does
+constexpr int most_tries = 60;  // attempts at Block Load, as in Linux
 
 }  // namespace
 
@@ -87,7 +87,7 @@ void PidSequence::refused() noexcept {
   if (step_ == Step::load) {
     if (++tries_ == most_tries) fail("the device does not answer to Block Load");
   } else if (step_ == Step::stop || step_ == Step::last_reset) {
-    done();  // on the way out there is nothing better than the next step
+    done();  // on the way out a failed step is skipped
   } else {
     fail("the device refuses a report that its descriptor describes");
   }

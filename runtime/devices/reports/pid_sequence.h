@@ -1,4 +1,4 @@
-// How a force-feedback joystick is made to show forces: a conversation, step by step, without the wire.
+// Start sequence of a force-feedback joystick, as a state machine without the connection.
 #pragma once
 
 #include <array>
@@ -10,47 +10,47 @@
 
 namespace palpate {
 
-/// What to do next with the device.
+/// Next action on the device.
 struct PidRequest {
   enum class Kind {
     output,       ///< hid_write the report
     set_feature,  ///< hid_send_feature_report it
     get_feature,  ///< hid_get_feature_report with its id and length
-    none,         ///< nothing: forces may be sent, or it is over
+    none,         ///< nothing: forces may be sent, or the sequence has ended
   };
   Kind kind = Kind::none;
   PidReport report;
 };
 
 /// Device reset, actuators on, then for each axis: Create New Effect, Block Load until it succeeds, Set
-/// Effect, Set Constant Force of 0, Effect Operation start. After that only Set Constant Force, one report an
-/// axis and tick.
+/// Effect, Set Constant Force of 0, Effect Operation start. After that only Set Constant Force, one report
+/// per axis and tick.
 ///
 ///     while (next().kind != none) { do it; done(); or received(report); or refused(); }
 class PidSequence {
  public:
-  /// Does not own the layout.
+  /// Keeps a reference to the layout.
   PidSequence(const PidLayout& layout, const PidConstants& constants) noexcept
       : layout_(layout), constants_(constants) {}
 
   [[nodiscard]] PidRequest next() const noexcept;
 
-  /// The output or feature report was sent.
+  /// Reports that the output or feature report was sent.
   void done() noexcept;
-  /// The device answered to get_feature.
+  /// Passes on the device's answer to get_feature.
   void received(std::span<const std::uint8_t> report) noexcept;
-  /// It did not take or not answer the request.
+  /// Reports that the device did not accept or answer the request.
   void refused() noexcept;
 
-  /// Effects play: force() may be sent.
+  /// True while the effects play: force() may be sent.
   [[nodiscard]] bool running() const noexcept { return step_ == Step::running; }
-  /// Why it will never run; null while it may.
+  /// Reason why the sequence has failed for good; null while it has not.
   [[nodiscard]] const char* failure() const noexcept { return failure_; }
 
-  /// Set Constant Force for x and y. Only while running.
+  /// Encodes Set Constant Force for x and y; only while running.
   [[nodiscard]] std::array<PidReport, pid_axes> force(const PidForce& wish) const noexcept;
 
-  /// From now on: stop both effects and reset the device. From any step, for every way out.
+  /// Stops both effects and resets the device from here on. May be called at any step.
   void stop() noexcept;
 
  private:

@@ -20,7 +20,7 @@ std::optional<std::array<std::int16_t, 3>> triple(std::span<const std::uint8_t> 
   return counts;
 }
 
-/// From -1 to 1, without the dead zone and without a step at its edge.
+/// Returns the rate from -1 to 1, without the dead zone and continuous at its edge.
 double rate(std::int16_t count, const SpaceMouseConstants& constants) noexcept {
   const double beyond = std::abs(static_cast<double>(count)) - constants.dead_zone;
   if (beyond <= 0.0) return 0.0;

@@ -9,7 +9,8 @@ namespace {
 
 constexpr double turn = 2.0 * std::numbers::pi;
 
-/// Joint angle per motor angle, signed: a capstan with its motor along the joint's axis turns the other way.
+/// Joint angle per motor angle, signed: a capstan whose motor points along the joint's axis reverses the
+/// sense.
 Vec3 transmission(const ArmConstants& arm) noexcept {
   Vec3 ratio = arm.capstan_diameters.cwiseQuotient(arm.body_diameters);
   for (int i = 0; i < 3; ++i) {
@@ -76,7 +77,7 @@ std::optional<Vec3> inverse_arm(const ArmConstants& arm, const Vec3& position) n
   const double Lc = arm.lengths[2];
   const double distance = std::hypot(reach, height);
   if (!(reach > 0.0) || !(distance <= Lb + Lc) || distance < std::abs(Lb - Lc)) return std::nullopt;
-  // The triangle of b, c and the line from b's joint to the handle, by the law of cosines.
+  // Triangle of b, c and the line from b's joint to the handle, by the law of cosines.
   const double cosine = (Lb * Lb + distance * distance - Lc * Lc) / (2.0 * Lb * distance);
   const double B = std::atan2(reach, height) - std::acos(std::clamp(cosine, -1.0, 1.0));
   const double C = std::atan2(reach - Lb * std::sin(B), Lb * std::cos(B) - height);

@@ -13,7 +13,7 @@ constexpr std::int16_t button_from = 5000;
 
 enum Command : std::int16_t { show_currents = 0, set_counters = 1 };
 
-/// Seven numbers behind the report id.
+/// Encodes the report id 0 and seven numbers.
 WoodenHapticsCommand encode(const std::array<std::int16_t, 7>& numbers) noexcept {
   WoodenHapticsCommand bytes{};
   for (std::size_t i = 0; i < numbers.size(); ++i) {
