@@ -12,7 +12,7 @@
 
 namespace {
 
-/// -1 where a text is no number.
+/// Parses a number; -1 if the text is not one.
 std::int64_t number_of(std::string_view text) {
   std::int64_t number = -1;
   const auto [end, bad] = std::from_chars(text.data(), text.data() + text.size(), number);

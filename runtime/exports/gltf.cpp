@@ -16,29 +16,30 @@ namespace {
 
 using nlohmann::json;
 
-// Numbers of the specification (Khronos, glTF 2.0).
+// Constants of the specification (Khronos, glTF 2.0).
 constexpr int float_component = 5126, index_component = 5125;
 constexpr int vertex_buffer = 34962, index_buffer = 34963;
 constexpr int lines = 1, triangles = 4;
 
 constexpr std::size_t glb_header = 12;  // [bytes]
 
-constexpr double point_share = 0.01;  // [size of the body] what a tool without a radius is drawn with
+constexpr double point_share = 0.01;  // [size of the body] radius at which a tool without one is drawn
 const double half = std::sqrt(0.5);
 const json z_becomes_y = json::array({-half, 0.0, 0.0, half});
 
 using Floats = std::vector<float>;
 
-/// The binary part, and the views and accessors that say what lies where.
+/// Binary part with its views and accessors.
 class Buffer {
  public:
-  /// The number of the accessor of some floats, `width` to an element. `target`: of the view, 0 for none.
+  /// Appends floats, `width` per element, and returns the number of their accessor. `target`: buffer target
+  /// of the view, 0 for none.
   int add(const Floats& numbers, int width, int target) {
     constexpr const char* types[] = {"SCALAR", "", "VEC3", "VEC4"};
     json accessor = {{"componentType", float_component},
                      {"count", numbers.size() / static_cast<std::size_t>(width)},
                      {"type", types[width - 1]}};
-    if (width == 3 || target == 0) {  // asked for of positions and of times
+    if (width == 3 || target == 0) {  // required for positions and times
       Floats least(numbers.begin(), numbers.begin() + width), most = least;
       for (std::size_t k = 0; k < numbers.size(); ++k) {
         const std::size_t axis = k % static_cast<std::size_t>(width);
@@ -86,7 +87,7 @@ std::vector<Vec3> displaced(const RecordedSurface& surface, const SurfaceFrame& 
   return places;
 }
 
-/// Normals of the nodes: means of those of the triangles around, by area.
+/// Nodal normals: means of the adjacent triangles' normals, weighted by area.
 std::vector<Vec3> normals_of(const RecordedSurface& surface, const std::vector<Vec3>& places) {
   std::vector<Vec3> normals(places.size(), Vec3::Zero());
   for (std::size_t t = 0; t < surface.simplices.size(); t += 3) {
@@ -118,13 +119,13 @@ std::vector<std::uint32_t> corners_of(const std::vector<Index>& simplices) {
   return {simplices.begin(), simplices.end()};
 }
 
-/// When each picture was taken, and where the tool was.
+/// Time and tool pose of each picture.
 struct Moments {
   std::vector<double> times;
   std::vector<ToolPose> tools;
 };
 
-/// The surface at rest without loads; its targets are the pictures.
+/// Mesh of the surface at rest without loads, with the pictures as morph targets.
 json surface_mesh(const RecordedSurface& surface, std::size_t pictures,
                   const std::function<SurfacePicture(std::size_t)>& picture_of, Moments& moments,
                   Buffer& buffer) {
@@ -159,7 +160,7 @@ json mesh_of_tool(const ToolMesh& mesh, Buffer& buffer) {
   return {{"name", "tool"}, {"primitives", json::array({primitive})}};
 }
 
-/// In each picture its own target, and the tool where it was.
+/// Animation that shows the morph target and the tool pose of each picture.
 json animation(const Moments& moments, int surface_node, int tool_node, Buffer& buffer) {
   const std::size_t pictures = moments.times.size();
   Floats times, weights(pictures * pictures, 0.0F), places, turns;
@@ -186,7 +187,7 @@ void append(std::string& bytes, std::uint32_t number) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(number >> shift & 0xFFU);
 }
 
-/// Head of a chunk of so many bytes.
+/// Header of a chunk of `bytes` bytes.
 std::string chunk_head(const char* kind, std::size_t bytes) {
   std::string head;
   append(head, static_cast<std::uint32_t>(bytes));

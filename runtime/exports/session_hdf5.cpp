@@ -15,7 +15,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t block = 8192;  // ticks that are written at once
+constexpr std::int64_t block = 8192;  // ticks written at a time
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
 
 template <class T>
@@ -45,17 +45,17 @@ void write_head(hdf5::File& file, const RecordingFile& recording) {
   write(file, "/surface/held", {std::ssize(held)}, held);
 }
 
-/// A field of a tick as a dataset: /ticks/NAME, with a row of `components` numbers for each tick.
+/// Field of a tick as a dataset: /ticks/NAME, with a row of `components` numbers for each tick.
 struct TickColumn {
   std::string name;
   NumberType type;
   std::int64_t components = 1;
-  std::size_t offset = 0;  ///< of the numbers in TickRecord
+  std::size_t offset = 0;  ///< offset of the numbers in TickRecord [byte]
 
   [[nodiscard]] std::size_t bytes() const { return type.bytes * static_cast<std::size_t>(components); }
 };
 
-/// Notes where the fields of a tick lie.
+/// Collects the layout of a tick's fields.
 class ColumnFinder {
  public:
   explicit ColumnFinder(const TickRecord& tick) : begin_(reinterpret_cast<const std::byte*>(&tick)) {}

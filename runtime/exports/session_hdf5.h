@@ -1,4 +1,4 @@
-// A recording as HDF5, for h5py, MATLAB and ParaView.
+// Export of a recording as HDF5, for h5py, MATLAB and ParaView.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace palpate {
 
-/// Rows [begin, end) of the ticks.
+/// Range [begin, end) of ticks.
 struct TickRange {
   std::int64_t begin = 0;
   std::int64_t end = 0;
 };
 
-/// Writes attributes, /ticks, /surface and the space of /frames for `pictures` pictures, as
-/// docs/reference/recording-fields.md has them, into a file that is emptied. Takes memory for some thousand
+/// Writes attributes, /ticks, /surface and, for `pictures` pictures, the allocated /frames, as in
+/// docs/reference/recording-fields.md. An existing file is overwritten. Needs memory for a few thousand
 /// ticks. Throws Error.
 void write_hdf5(const std::filesystem::path& file, const RecordingFile& recording, TickRange ticks,
                 std::int64_t pictures);

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-/// A file's name for the value of an entity, which is read twice.
+/// Escapes a file name for the value of an XML entity, which is parsed twice.
 std::string escape(const std::string& name) {
   std::string escaped;
   for (const char c : name) {
@@ -35,7 +35,7 @@ std::string escape(const std::string& name) {
   return escaped;
 }
 
-/// Beside displacement.
+/// Scalar field of a picture.
 struct Scalar {
   char entity;
   const char* dataset;
@@ -84,8 +84,7 @@ void write_xdmf(const std::filesystem::path& hdf5, const RecordedSurface& surfac
         "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0} 3\"><DataItem Dimensions=\"3 3\">{1} 0 0 1 1 1 1 "
         "{0} 3</DataItem>&u;</DataItem>",
         S, k);
-    // ParaView keeps the geometry of the frame before where the first text in it is the same: hence the
-    // comment.
+    // ParaView keeps the geometry of the previous frame if its first text is the same; hence the comment.
     std::string text;
     fmt::format_to(std::back_inserter(text),
                    "<Grid><Time Value=\"{}\"/>&t;<Geometry><DataItem ItemType=\"Function\" "

@@ -1,4 +1,4 @@
-// The ticks of a recording as a table.
+// Export of a recording's ticks as a table.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// A tick as a line of numbers, comma-separated, under `ticks_header`. SI units; force and torque are those
-/// on the body. Numbers are the shortest that read back as they are.
+/// Returns a tick as a line of comma-separated numbers under `ticks_header`. SI units; force and torque are
+/// those on the body. Each number is the shortest text that reads back exactly.
 [[nodiscard]] std::string ticks_line(const TickRecord& tick);
 
 }  // namespace palpate

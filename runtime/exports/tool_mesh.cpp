@@ -6,16 +6,15 @@
 namespace palpate {
 namespace {
 
-constexpr int quarter = 8;  // rings from a pole to where the outline turns straight
-constexpr int around = 32;  // vertices of a ring
+constexpr int quarter = 8;  // rings from a pole to the straight part of the outline
+constexpr int around = 32;  // vertices per ring
 
-/// A point of the outline: its distance from the axis, its height, and the angle of its normal above the
-/// horizon.
+/// Point of the outline: distance from the axis, height, and elevation angle of its normal.
 struct Ring {
   double wide, high, latitude;
 };
 
-/// From the lower pole to the upper one.
+/// Outline from the lower pole to the upper one.
 std::vector<Ring> outline(const Tool& tool, double point) {
   const double radius = tool.radius > 0.0 || tool.disc_radius > 0.0 ? tool.radius : point;
   const double flat = std::max(tool.disc_radius - radius, 0.0);

@@ -1,4 +1,4 @@
-// What a tool looks like.
+// Triangle mesh of a tool.
 #pragma once
 
 #include <vector>
@@ -7,15 +7,15 @@
 
 namespace palpate {
 
-/// Triangles, counter-clockwise seen from outside.
+/// Triangle mesh, counter-clockwise seen from outside.
 struct ToolMesh {
-  std::vector<Vec3> positions;   ///< [V] from the tool's origin, not turned [m]
+  std::vector<Vec3> positions;   ///< [V] in the tool's frame [m]
   std::vector<Vec3> normals;     ///< [V] outward
   std::vector<Index> triangles;  ///< [T x 3]
 };
 
-/// A sphere, capsule or disc with a round edge, turned out of rings of latitude; a point as a sphere of
-/// radius `point` [m].
+/// Returns the mesh of a sphere, capsule or disc with a round edge, made of rings of latitude; a point
+/// becomes a sphere of radius `point` [m].
 [[nodiscard]] ToolMesh tool_mesh(const Tool& tool, double point);
 
 }  // namespace palpate
