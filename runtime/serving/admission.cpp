@@ -18,7 +18,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::string_view http_port = "80";  // which Host leaves out
+constexpr std::string_view http_port = "80";  // omitted from Host
 
 bool is_ipv4(const std::string& text) {
   in_addr address{};
@@ -30,7 +30,7 @@ bool is_ipv6(const std::string& text) {
   return inet_pton(AF_INET6, text.c_str(), &address) == 1;
 }
 
-/// Nothing for what is no port from 1 on, in digits.
+/// Parses a port in digits; empty unless it is at least 1.
 std::optional<std::uint16_t> port_of(const std::string& text) {
   std::uint16_t port = 0;
   const char* const end = text.data() + text.size();
@@ -61,7 +61,7 @@ std::string url_host(const std::string& address) {
 }
 
 bool is_served(std::string_view host, const std::string& address, std::uint16_t port) {
-  const std::size_t bracket = host.rfind(']');  // colons before it are of an IPv6 address
+  const std::size_t bracket = host.rfind(']');  // colons before it belong to an IPv6 address
   const std::size_t colon = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
   const std::string name = lower_case(host.substr(0, colon));
   const std::string number(colon == std::string_view::npos ? http_port : host.substr(colon + 1));

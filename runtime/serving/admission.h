@@ -1,4 +1,4 @@
-// Which requests a viewer answers.
+// Checks of the requests to a viewer: host, origin and token.
 #pragma once
 
 #include <cstdint>
@@ -7,31 +7,31 @@
 
 namespace palpate {
 
-bool is_any_address(const std::string& address);  ///< 0.0.0.0 or ::
-/// Whether a host, as a browser writes it, is localhost, 127.x.x.x or [::1].
+bool is_any_address(const std::string& address);  ///< true for 0.0.0.0 and ::
+/// True if a host, as written by a browser, is localhost, 127.x.x.x or [::1].
 bool is_this_machine(const std::string& host);
-/// As in a URL: IPv6 in brackets.
+/// Returns the address as in a URL: IPv6 in brackets.
 std::string url_host(const std::string& address);
 
-/// Whether a request's `Host` names this machine (localhost, 127.0.0.0/8, [::1]) with whatever port, as that
-/// of a tunnel is another one; or the address served, with its port; where all addresses are served, any IP
-/// address with that port. No other name, even one that leads here: a foreign page could have made it do so.
+/// True if a request's `Host` names this machine (localhost, 127.0.0.0/8, [::1]) with any port, since that of
+/// a tunnel differs; or the served address with its port; or, if all addresses are served, any IP address
+/// with that port. Other names are refused even if they resolve to this machine: a foreign page could have
+/// arranged that.
 bool is_served(std::string_view host, const std::string& address, std::uint16_t port);
 
-/// Whether `Origin` is the page that `Host` serves.
+/// True if `Origin` is the page served by `Host`.
 bool is_own_page(std::string_view origin, std::string_view host);
 
-/// 128 random bits as hexadecimal digits.
+/// Returns 128 random bits as hexadecimal digits.
 std::string random_token();
-/// Whether it may be one: 32 of such digits.
+/// True if the text has the form of a token: 32 hexadecimal digits.
 bool is_token(std::string_view text) noexcept;
-/// What only who has the token can answer to `nonce`: SHA-256 of both, as hexadecimal digits.
+/// Proof of knowing the token, for `nonce`: SHA-256 of both, as hexadecimal digits.
 std::string proof_of(const std::string& token, std::string_view nonce);
-/// Takes as long wherever they differ.
+/// Compares in constant time.
 bool is_same_token(std::string_view given, std::string_view token) noexcept;
 
-/// What stands before the `?` of a request's target, and the values of `token` and `nonce` behind it, empty
-/// without.
+/// Target of a request: path before the `?`, and the values of `token` and `nonce` after it, empty if absent.
 struct Target {
   std::string_view path;
   std::string_view token, nonce;

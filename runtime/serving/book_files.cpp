@@ -70,7 +70,7 @@ std::optional<BookFile> read_book_file(const fs::path& book, std::string_view na
     return std::nullopt;
   try {
     return BookFile{content_type_of(file), read_all(file)};
-  } catch (const Error&) {  // not for this user, or gone
+  } catch (const Error&) {  // no permission, or gone
     return std::nullopt;
   }
 }

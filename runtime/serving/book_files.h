@@ -1,4 +1,4 @@
-// The book, for whoever opens it from the viewer's help.
+// Files of the book, served for the viewer's help.
 #pragma once
 
 #include <filesystem>
@@ -8,19 +8,19 @@
 
 namespace palpate {
 
-/// Folder of the book's site: the one installed with this program, else the one that scripts/docs has built
-/// in this program's source tree. Empty where there is neither.
+/// Returns the folder of the book's site: the one installed with this program, otherwise the one built by
+/// scripts/docs in this program's source tree. Empty if there is neither.
 std::filesystem::path find_book();
 
-/// A file of the site, as a browser is to take it.
+/// File of the site with its content type.
 struct BookFile {
   std::string content_type;
   std::string bytes;
 };
 
-/// The file that an address names ("tutorials/push-a-liver.html"), if it is one of the site: a regular file
-/// below `book` that no link leads to, of at most 16 MB. A name has letters, digits and `. _ - /` only, and
-/// no part of it begins with a dot.
+/// Reads the file that an address names ("tutorials/push-a-liver.html"). Empty unless it is a regular file
+/// below `book`, not reached through a link, of at most 16 MB. A name consists of letters, digits and `. _ -
+/// /`, and no component begins with a dot.
 std::optional<BookFile> read_book_file(const std::filesystem::path& book, std::string_view name);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// An address that is taken before a run begins, so that what comes next cannot fail for it.
+// Listening socket that is opened before a run begins, so that later steps cannot fail because of it.
 #pragma once
 
 #include <cstdint>
@@ -8,22 +8,23 @@ namespace palpate {
 
 struct ListenAddress {
   std::string address = "127.0.0.1";  ///< IPv4 or IPv6
-  std::uint16_t port = 0;             ///< 0: any that is free
+  std::uint16_t port = 0;             ///< 0: any free port
 };
 
-/// Who connects waits until a server has the socket, and is turned away when it is destroyed instead.
+/// Listening socket. A client that connects waits until a server takes the socket over, and is disconnected
+/// if the socket is destroyed instead.
 class ListeningSocket {
  public:
-  /// Throws Error (port in use, address unknown), where `who` says what was to listen.
+  /// Throws Error (port in use, unknown address), in which `who` names the listener.
   ListeningSocket(const ListenAddress& wanted, const char* who);
   ~ListeningSocket();
   ListeningSocket(ListeningSocket&& other) noexcept;
   ListeningSocket(const ListeningSocket&) = delete;
   ListeningSocket& operator=(const ListeningSocket&) = delete;
 
-  /// With the port that it got.
+  /// Address with the actual port.
   [[nodiscard]] const ListenAddress& address() const noexcept { return address_; }
-  /// The socket itself, which is the caller's from now on.
+  /// Returns the socket and passes its ownership to the caller.
   [[nodiscard]] int release() noexcept;
 
  private:

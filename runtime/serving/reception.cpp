@@ -11,8 +11,8 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::ptrdiff_t most_strangers = 32;  // connections that have not shown the token
-constexpr std::ptrdiff_t most_admitted = 32;   // and that have
+constexpr std::ptrdiff_t most_strangers = 32;  // connections without the token
+constexpr std::ptrdiff_t most_admitted = 32;   // connections with it
 constexpr auto retry_time = std::chrono::milliseconds(500);
 
 tcp protocol_of(const std::string& address) {
@@ -29,7 +29,7 @@ Reception::Reception(asio::io_context& context, const std::string& address, int 
 void Reception::accept() {
   acceptor_.async_accept([this](const error_code& problem, tcp::socket socket) {
     if (!acceptor_.is_open()) return;
-    if (problem) {  // no file is left for a connection: later there may be
+    if (problem) {  // out of file descriptors: retry later
       retry_.expires_after(retry_time);
       retry_.async_wait([this](const error_code&) { accept(); });
       return;
@@ -41,7 +41,7 @@ void Reception::accept() {
   });
 }
 
-/// Else strangers that hold connections would keep all others out.
+/// Otherwise open connections without the token would keep all others out.
 void Reception::make_room() {
   const auto is_stranger = [](const auto& one) { return !one->is_admitted(); };
   if (std::count_if(connections_.begin(), connections_.end(), is_stranger) < most_strangers) return;

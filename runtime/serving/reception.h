@@ -1,4 +1,4 @@
-// The connections of a server of pages.
+// Connections of a page server.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// A connection that a Reception has taken in.
+/// Connection accepted by a Reception.
 class Received {
  public:
   Received() = default;
@@ -20,31 +20,30 @@ class Received {
   Received& operator=(const Received&) = delete;
 
   virtual void start() = 0;
-  /// Closes it, without a word.
+  /// Closes it without a message.
   virtual void cut() = 0;
-  /// It does not read what it is sent.
+  /// True if the client does not read the data sent to it.
   [[nodiscard]] virtual bool is_stalled() const { return false; }
-  /// It has shown the token, and there is room for it.
+  /// True if it has shown the token and there was capacity for it.
   [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
 
  protected:
   bool is_admitted_ = false;
 };
 
-/// Accepts connections and bounds their number. Those that have not shown the token are few, and give way:
-/// when there is no room for another one, the oldest of them is cut. So nobody without the token keeps out
-/// who has it, and all who have it are this user's: they are told when there are too many of them. For one
-/// thread.
+/// Accepts connections and bounds their number. Few may be without the token, and they give way: at the limit
+/// the oldest of them is closed. A client without the token therefore cannot keep out one with it. Clients
+/// with the token belong to this user and are told when there are too many. For use by one thread.
 class Reception {
  public:
   using Receive = std::function<std::shared_ptr<Received>(boost::asio::ip::tcp::socket)>;
 
-  /// Accepts at a listening socket of `address`, which is its own from now on. `context` must live as long.
+  /// Accepts on a listening socket of `address`, which it owns from now on. `context` must outlive this.
   Reception(boost::asio::io_context& context, const std::string& address, int socket, Receive receive);
 
-  /// Whether another connection that has shown the token may be answered.
+  /// True if another connection with the token may be accepted.
   [[nodiscard]] bool has_room() const;
-  /// It is gone.
+  /// Removes a closed connection.
   void leave(const Received& connection);
   void cut_stalled();
   void cut_all();
@@ -57,7 +56,7 @@ class Reception {
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer retry_;
   Receive receive_;
-  std::vector<std::shared_ptr<Received>> connections_;  // as they came
+  std::vector<std::shared_ptr<Received>> connections_;  // in order of arrival
 };
 
 }  // namespace palpate

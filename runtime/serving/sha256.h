@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4), which browsers have too.
+// SHA-256 (FIPS 180-4), which browsers provide too.
 #pragma once
 
 #include <array>

@@ -19,15 +19,15 @@ std::string seen_from_here(const std::string& address) {
   return address == "::" ? "[::1]" : "127.0.0.1";
 }
 
-/// The last run's at this port, if it showed the same to this user; else a new one, which is kept. Who has
-/// the port has the file.
+/// Returns the token of the last run at this port if it showed the same files to this user; otherwise a new
+/// one, which is stored. Only the run that owns the port uses the file.
 std::string token_of(const ViewerOptions& options) {
   if (options.shows.empty() || options.port == 0 || options.told >= 0 ||
       !is_this_machine(url_host(options.address)))
     return random_token();
   std::string shows;
   for (const std::filesystem::path& file : options.shows) {
-    std::error_code nothing_there;  // which is told later
+    std::error_code nothing_there;  // reported later
     shows += std::filesystem::weakly_canonical(file, nothing_there).string() + "\n";
   }
   std::string token = random_token();
@@ -37,7 +37,7 @@ std::string token_of(const ViewerOptions& options) {
     const std::string before = kept.substr(0, token.size());
     if (is_token(before) && kept == before + "\n" + shows) return before;
     write_private_file(file, token + "\n" + shows);
-  } catch (const Error&) {  // there is no folder for it: the next run has another one
+  } catch (const Error&) {  // no folder for it: the next run gets a new token
   }
   return token;
 }
@@ -66,7 +66,7 @@ void tell_address(const ServedAddress& served, const std::string& url, std::stri
   }
   const std::string line =
       fmt::format("{{\"url\": \"{}\", \"port\": {}, \"token\": \"{}\"}}\n", url, served.port, served.token);
-  static_cast<void>(write_all(served.told, line));  // a program that is gone needs no address
+  static_cast<void>(write_all(served.told, line));  // a program that has gone needs no address
 }
 
 }  // namespace palpate
