@@ -1,4 +1,4 @@
-// Pictures with what they are drawn on.
+// Pictures together with the scene and overlay that they belong to.
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,26 @@
 
 namespace palpate {
 
-/// A picture and what it is drawn on.
+/// Picture with its scene and overlay.
 struct DrawnPicture {
   std::shared_ptr<const Scene> scene;
-  std::shared_ptr<const ScenePatch> patch;  ///< null: none
-  SurfacePicture picture;                   ///< without its patch
+  std::shared_ptr<const ScenePatch> patch;  ///< null: no overlay
+  SurfacePicture picture;                   ///< without its own patch
 };
 
-/// Draws the overlay of pictures anew where it is another one than the last picture's.
+/// Attaches scene and overlay to pictures; the overlay's drawing is rebuilt when it differs from the last
+/// picture's.
 class PictureDrawing {
  public:
-  /// All pictures from now on are of this scene.
+  /// Sets the scene of all pictures from now on.
   void set_scene(std::shared_ptr<const Scene> scene) { scene_ = std::move(scene); }
-  /// Nothing where the picture has no values for all nodes, or there is no scene. `body`, which the scene is
-  /// of, is used during the call only: null for no overlay.
+  /// Returns nothing if the picture lacks values for some nodes, or there is no scene. `body`, to which the
+  /// scene belongs, is used only during the call; null for no overlay.
   [[nodiscard]] std::optional<DrawnPicture> draw(SurfacePicture picture, const Body* body);
 
  private:
   std::shared_ptr<const Scene> scene_;
-  // The last picture's. The patch is kept so that no other one can have its address.
+  // Those of the last picture. The patch is kept alive so that no other one can get its address.
   std::shared_ptr<const Scene> patch_scene_;
   std::shared_ptr<const Patch> patch_;
   std::shared_ptr<const ScenePatch> drawn_patch_;

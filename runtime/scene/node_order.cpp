@@ -9,10 +9,11 @@
 namespace palpate {
 namespace {
 
-constexpr unsigned bits = 20;  // of a coordinate: cells of a millionth of the body
+constexpr unsigned bits = 20;  // per coordinate: cells of a millionth of the body
 using Cell = std::array<std::uint32_t, 3>;
 
-/// How far along the curve a cell is (J. Skilling, Programming the Hilbert curve, AIP Conf. Proc. 707, 2004).
+/// Returns the position of a cell along the curve (J. Skilling, Programming the Hilbert curve, AIP Conf.
+/// Proc. 707, 2004).
 std::uint64_t place_on_curve(Cell x) {
   for (std::uint32_t q = 1U << (bits - 1); q > 1; q >>= 1U) {
     const std::uint32_t low = q - 1;

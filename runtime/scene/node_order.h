@@ -1,4 +1,4 @@
-// An order of nodes in which neighbours follow each other.
+// Order of nodes in which neighbours follow each other.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// All nodes in the order in which a Hilbert curve through their bounding cube meets them: each is near the
-/// one before it, in space or in the plane. Nodes at one place stay in their own order.
+/// Returns all nodes in the order of a Hilbert curve through their bounding cube, in space or in the plane:
+/// each is near the previous one. Coincident nodes keep their own order.
 std::vector<Index> order_along_curve(std::span<const Vec3> nodes);
 
 }  // namespace palpate

@@ -17,14 +17,14 @@ Line undirected(Index a, Index b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-/// Each once.
+/// Removes duplicates.
 std::vector<Line> unique(std::vector<Line> lines) {
   std::sort(lines.begin(), lines.end());
   lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
   return lines;
 }
 
-/// Edges of an element or a facet in the plane of it: curved ones as two halves.
+/// Appends the edges of an element or a facet; a curved edge becomes two segments.
 void add_edges(ElementType type, std::span<const Index> nodes, std::vector<Line>& edges) {
   std::size_t middle = type == ElementType::tri6 ? static_cast<std::size_t>(traits(type).corners) : 0;
   for (const EdgeNodes& edge : element_edges(type)) {
@@ -112,7 +112,7 @@ void fill_surface(const Body& body, Scene& scene) {
   scene.edges = unique(std::move(edges));
 }
 
-/// Edges of one triangle only.
+/// Returns the edges that belong to one triangle only.
 std::vector<Line> outline_of(std::span<const std::array<Index, 3>> triangles) {
   std::vector<Line> edges = edges_of(triangles);
   std::sort(edges.begin(), edges.end());

@@ -21,7 +21,7 @@ Vec3 seen(const SeenValues& values, const Scene& scene, const ScenePatch* patch,
   return without_loads + Eigen::Map<const Eigen::Vector3f>(values.displacement(k)).cast<double>();
 }
 
-/// Node numbers, those of the patch from S on. [triangles * 3]
+/// Returns node numbers [triangles * 3], those of the patch from S on.
 std::vector<Index> seen_triangles(const Scene& scene, const ScenePatch* patch) {
   std::vector<bool> is_hidden(scene.triangles.size());
   if (patch != nullptr) {

@@ -1,4 +1,4 @@
-// The surface as a viewer shows it, as files.
+// Export of the visible surface as files.
 #pragma once
 
 #include <string>
@@ -9,24 +9,24 @@
 
 namespace palpate {
 
-/// Binary STL of the triangles, where they are seen: those of the patch (null: none) in place of the hidden.
-/// The picture fits (scene.h). Throws Error when there are no triangles.
+/// Returns binary STL of the visible, displaced triangles: those of the patch (null: none) replace the hidden
+/// ones. The picture fits (scene.h). Throws Error if there are no triangles.
 std::string surface_stl(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
-/// What is seen of a body, with its values.
+/// Visible mesh of a body with its values.
 struct SeenMesh {
-  ElementType cell = ElementType::tri3;  ///< or line2: the boundary of a body in the plane without triangles
+  ElementType cell = ElementType::tri3;  ///< line2: boundary of a body in the plane without triangles
   std::vector<Index> cells;              ///< [triangles x 3] or [lines x 2] node numbers
-  std::vector<Vec3> nodes;               ///< [n] of the scene, then of the patch, where they are seen [m]
-  std::vector<double> displacement;      ///< [n x 3] from the place without loads to there [m]
-  std::vector<double> von_mises;         ///< [n] not a number where it is not known [Pa]
-  std::vector<double> pressure;          ///< [n] of the contact [Pa]
+  std::vector<Vec3> nodes;               ///< [n] displaced nodes of the scene, then of the patch [m]
+  std::vector<double> displacement;      ///< [n x 3] from the position without loads [m]
+  std::vector<double> von_mises;         ///< [n] NaN where unknown [Pa]
+  std::vector<double> pressure;          ///< [n] contact pressure [Pa]
 };
 
-/// The picture fits (scene.h); the triangles are those of surface_stl.
+/// Builds the visible mesh. The picture fits (scene.h); the triangles are those of surface_stl.
 SeenMesh seen_mesh(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
-/// VTK XML of the same, with nodal `displacement`, `von_mises` and `pressure`.
+/// Returns the same as VTK XML, with nodal `displacement`, `von_mises` and `pressure`.
 std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// Values of a picture at the nodes that a viewer draws.
+// Values of a picture at the drawn nodes.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// At node k of the scene or, from S on, of the patch. References: all must live as long. The picture fits.
+/// Values at node k of the scene or, from S on, of the patch. Keeps references: all arguments must outlive
+/// it. The picture fits.
 class SeenValues {
  public:
   SeenValues(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch)
@@ -17,26 +18,25 @@ class SeenValues {
   [[nodiscard]] std::size_t scene_nodes() const { return scene_.nodes.size(); }
   [[nodiscard]] std::size_t patch_nodes() const { return patch_ == nullptr ? 0 : patch_->nodes.size(); }
 
-  /// x, y, z of node + this is what is seen [m].
+  /// Displacement x, y, z of node k from its position without loads [m].
   [[nodiscard]] const float* displacement(std::size_t k) const {
     const bool of_plane = scene_.is_plane && k < scene_nodes();
     return (of_plane ? picture_.plane_displacement : picture_.frame.displacement).data() + 3 * value(k);
   }
-  /// Not a number where it is not known [Pa].
+  /// Von Mises stress; NaN where unknown [Pa].
   [[nodiscard]] float von_mises(std::size_t k) const {
     const bool of_plane = scene_.is_plane && k < scene_nodes();
     return at(of_plane ? picture_.plane_von_mises : picture_.frame.von_mises, value(k));
   }
-  /// Pressure of the contact, at node k of the scene's on the body's surface or, from there on, of the patch
-  /// [Pa].
+  /// Contact pressure [Pa] at a surface node.
   struct Pressure {
-    Index node;  ///< of the scene, from S on of the patch
+    Index node;  ///< node of the scene, or from S on of the patch
     float value;
   };
   [[nodiscard]] std::vector<Pressure> pressures() const {
     std::vector<Pressure> found;
     const std::size_t of_body =
-        scene_.is_plane ? scene_.surface_nodes.size() : scene_nodes();  // the body's on the surface
+        scene_.is_plane ? scene_.surface_nodes.size() : scene_nodes();  // surface nodes of the body
     const auto add = [&](std::size_t node, std::size_t surface_node) {
       const float p = at(picture_.frame.pressure, surface_node);
       if (std::isfinite(p) && p != 0.0F) found.push_back({static_cast<Index>(node), p});
