@@ -10,7 +10,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto state_period = std::chrono::milliseconds(500);
-constexpr double seconds_of_ticks = 2.0;  // that a slow page is sent
+constexpr double seconds_of_ticks = 2.0;  // span of ticks sent to a slow page
 constexpr std::size_t most_recorded_ticks = 1U << 18U;
 
 Message binary_message(std::string bytes) {
@@ -30,11 +30,11 @@ void Broadcast::set_scene(std::shared_ptr<const Scene> scene) {
   forget_frames();
   ticks_.clear();
   ++scenes_;
-  touch_state();  // which has the scene's number
+  touch_state();  // it contains the scene's number
 }
 
 void Broadcast::set_picture(DrawnPicture picture) {
-  if (picture.scene != scene_) return;  // of the body before
+  if (picture.scene != scene_) return;  // belongs to the previous body
   if (!picture_ || picture_->patch != picture.patch) patch_message_ = {};
   picture_ = std::move(picture);
   forget_frames();

@@ -1,4 +1,4 @@
-// What all pages of a viewer are to see.
+// Content that all pages of a viewer see.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace palpate {
 
-/// Encoded once, sent to many.
+/// Message that is encoded once and sent to many pages.
 struct Message {
   std::shared_ptr<const std::string> bytes;
   bool is_text = false;
@@ -24,20 +24,20 @@ struct Message {
 };
 Message text_message(std::string text);
 
-/// Encoded when the first page wants it. Counts tell a page whether it has been sent what there is. For the
-/// server's thread.
+/// Content of the pages, encoded when the first page needs it. Counters tell a page whether it has received
+/// the latest. For the server's thread.
 class Broadcast {
  public:
   void set_scene(std::shared_ptr<const Scene> scene);
-  /// Nothing, where it is of another scene.
+  /// Ignores a picture of another scene.
   void set_picture(DrawnPicture picture);
-  /// Adds ticks to those shown: of a `replay` all are kept, otherwise the last two seconds.
+  /// Adds ticks. A `replay` keeps all of them (up to a large bound), otherwise the last two seconds are kept.
   void add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay);
   void set_state(StateWord state);
   void set_times(nlohmann::json times) { times_ = std::move(times); }
-  /// Pages are to be sent the state again.
+  /// Marks the state as new, so that it is sent to the pages again.
   void touch_state();
-  /// Has the state sent to pages again where that was last half a second ago.
+  /// Marks the state as new if that was last done half a second ago.
   void repeat_state();
 
   [[nodiscard]] std::int64_t scenes() const noexcept { return scenes_; }
@@ -46,14 +46,15 @@ class Broadcast {
   [[nodiscard]] const TickHistory& ticks() const noexcept { return ticks_; }
   [[nodiscard]] const std::optional<DrawnPicture>& picture() const noexcept { return picture_; }
 
-  // Of what there is, see above.
+  // Messages of the current content.
   [[nodiscard]] const Message& scene_message() const noexcept { return scene_message_; }
   [[nodiscard]] const Message& patch_message();
-  /// For a page that has `base`, which is null or of this scene. Pages that have the same share it.
+  /// Frame for a page that has `base`, which is null or of this scene. Pages with the same base get the same
+  /// message.
   [[nodiscard]] const Message& frame_message(const WireValues* base);
-  /// What a page has of the picture once it is sent.
+  /// Values that a page has once it has received the picture.
   [[nodiscard]] const std::shared_ptr<const WireValues>& values();
-  /// The message of the ticks from `place` on, which it moves on.
+  /// Returns the message of the ticks from `place` on, and advances `place`.
   [[nodiscard]] Message ticks_message(std::int64_t& place);
   [[nodiscard]] Message state_message(const PageRole& role, bool is_first) const;
 
@@ -76,12 +77,12 @@ class Broadcast {
   std::chrono::steady_clock::time_point state_touched_;
   Message scene_message_;
   Message patch_message_;
-  std::shared_ptr<const WireValues> values_;  // of the picture, once a page wants it
-  std::vector<Frame> frames_;                 // of the picture
-  Message run_message_;                       // of the ticks that a page was sent last
+  std::shared_ptr<const WireValues> values_;  // values of the picture, once a page needs them
+  std::vector<Frame> frames_;                 // frames of the picture, by their base
+  Message run_message_;                       // last message of ticks
   std::int64_t run_begin_ = 0;
   std::int64_t run_end_ = 0;
-  std::int64_t run_last_ = 0;  // end of all ticks then
+  std::int64_t run_last_ = 0;  // end of all ticks when it was made
 };
 
 }  // namespace palpate

@@ -25,7 +25,7 @@ Target target_of(const Request& request) {
   return split_target(text_view(request.target()));
 }
 
-/// Path of a request; the second run's without what is before it, as the first one's would be.
+/// Path of a request within its run: for the second run without its prefix.
 std::string_view path_in_run(const Request& request, const ServedAddress& served) {
   const std::string_view path = target_of(request).path;
   return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);
@@ -81,7 +81,7 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
   if (!wants_book(request) && !wants_proof(request)) {
     if (std::optional<Response> refused = token_refusal(request, served)) {
       if (!wants_page(request, served)) return refused;
-      Response page = answer(request, served, {});  // which says what to do: it is the same for everybody
+      Response page = answer(request, served, {});  // it explains what to do; the same for every client
       page.result(http::status::forbidden);
       return page;
     }

@@ -1,4 +1,4 @@
-// What a viewer answers by HTTP.
+// HTTP answers of a viewer.
 #pragma once
 
 #include <boost/beast/http.hpp>
@@ -18,29 +18,29 @@ using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 /// Subprotocol of the WebSocket.
 inline constexpr const char* subprotocol = "palpate.2";
 
-/// Why a request is not answered at all: its host, page, method, token or subprotocol.
+/// Refusal of a request by host, origin, method, token or subprotocol; empty if it is accepted.
 std::optional<Response> refusal(const Request& request, const ServedAddress& served);
 
-/// Which of the runs it is about: the second one's addresses begin with /2/, all others are the first one's.
+/// Index of the run that a request is about: addresses of the second begin with /2/, all others belong to the
+/// first.
 std::size_t run_of(const Request& request, const ServedAddress& served);
 
-/// Whether it wants to go on as a WebSocket.
+/// True for a request to upgrade to a WebSocket.
 bool wants_socket(const Request& request, const ServedAddress& served);
 
-/// Whether it asks for a proof that the server has the token, before it shows its own.
+/// True for a request that asks the server to prove that it has the token, before it shows its own.
 bool wants_proof(const Request& request);
 
-/// The proof.
+/// Returns the proof.
 Response proof_answer(const Request& request, const ServedAddress& served);
 
-/// Whether it asks for the book, which is the same for everybody and needs no token.
+/// True for a request for the book, which is public and needs no token.
 bool wants_book(const Request& request);
 
-/// A file of the book, or that it is not there.
+/// Returns a file of the book, or "not found".
 Response book_answer(const Request& request, const std::filesystem::path& book);
 
-/// To all other requests that are not refused: the page, the surface as it is seen in the run that it asks
-/// for, or that it is not there.
+/// Answers all other accepted requests: the page, the visible surface of the run asked for, or "not found".
 Response answer(const Request& request, const ServedAddress& served,
                 const std::optional<DrawnPicture>& shown);
 

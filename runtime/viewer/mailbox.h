@@ -1,4 +1,4 @@
-// How what is shown comes to the viewer's thread.
+// Handover of new content to the viewer's thread.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// What has been shown since the viewer's thread last looked.
+/// Content posted since the viewer's thread last took it.
 struct Mail {
   struct Ticks {
     std::vector<TickNote> notes;
@@ -24,12 +24,12 @@ struct Mail {
   std::optional<DrawnPicture> picture;
   std::deque<Ticks> ticks;
   std::optional<StateWord> state;
-  nlohmann::json times;  ///< of the last state that had them
+  nlohmann::json times;  ///< times from the last state that had any
 };
 
 class Mailbox {
  public:
-  /// Calls `put` with the mail, by any thread. True where it was empty: the viewer's thread is to be woken.
+  /// Calls `put` with the mail; for any thread. Returns true if it was empty: wake the viewer's thread.
   template <class Put>
   [[nodiscard]] bool post(Put&& put) {
     const std::lock_guard lock(mutex_);

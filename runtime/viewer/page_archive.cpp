@@ -21,7 +21,7 @@ std::string deflated(std::string_view bytes) {
   const int result =
       compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
                 static_cast<uLong>(bytes.size()), Z_DEFAULT_COMPRESSION);
-  if (result != Z_OK) throw std::bad_alloc();  // with that much room it has no other way to fail
+  if (result != Z_OK) throw std::bad_alloc();  // with this capacity it cannot fail otherwise
   packed.resize(size);
   return packed;
 }

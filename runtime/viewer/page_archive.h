@@ -1,4 +1,4 @@
-// The viewer's messages within a page, in place of a socket.
+// Viewer messages stored in a page, in place of a socket.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// Collects messages as web/PROTOCOL.md has them; the page that they are put into plays them by itself. Each
-/// is kept as u32 length, u32 kind (0 text, 1 binary), payload.
+/// Collects messages of web/PROTOCOL.md; a page that contains them plays them by itself. Each is stored as
+/// u32 length, u32 kind (0 text, 1 binary), payload.
 class PageArchive {
  public:
   void add_text(std::string_view json) { add(json, 0); }
@@ -17,8 +17,8 @@ class PageArchive {
 
   [[nodiscard]] std::size_t bytes() const noexcept { return messages_.size(); }
 
-  /// `page` with all messages in it: deflated, as base64, in a script element "palpate-session" that no
-  /// browser runs.
+  /// Returns `page` with all messages: deflated, as base64, in a script element "palpate-session" that
+  /// browsers do not execute.
   [[nodiscard]] std::string page(std::string_view page) const;
 
  private:

@@ -18,15 +18,15 @@ using asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr std::uint32_t longest_request = 8192;  // header [bytes]
-constexpr auto request_time = 10s;               // for a header to be said
-constexpr auto response_time = 30s;              // for an answer to be taken
-constexpr auto idle_time = 30s;                  // half of it: a ping
-constexpr auto stall_time = 10s;                 // that a message may wait for its page to read
-constexpr std::size_t most_unread = 32U << 20U;  // [bytes] of what a page must not miss
-constexpr int send_buffer = 256 << 10;           // small, so that a slow page sees what is, not what was
+constexpr std::uint32_t longest_request = 8192;          // header [bytes]
+constexpr auto request_time = 10s;                       // to receive a header
+constexpr auto response_time = 30s;                      // for the client to read an answer
+constexpr auto idle_time = 30s;                          // a ping is sent after half of it
+constexpr auto stall_time = 10s;                         // for the page to read a message
+constexpr std::size_t most_unread = 32U << 20U;          // [bytes] of queued texts
+constexpr int send_buffer = 256 << 10;                   // small, so that a slow page sees recent pictures
 constexpr std::int64_t nanoseconds_per_byte = 1000 / 6;  // of pictures: 6 MB/s
-constexpr std::size_t longest_reason = 120;              // that a closing frame has room for
+constexpr std::size_t longest_reason = 120;              // bytes that fit into a closing frame
 
 }  // namespace
 
@@ -82,7 +82,7 @@ void PageConnection::respond(Response response) {
 void PageConnection::open_socket() {
   const Request& request = parser_->get();
   const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
-  stream_.expires_never();  // the socket has its own times
+  stream_.expires_never();  // the WebSocket has timeouts of its own
   socket_.emplace(std::move(stream_));
   websocket::stream_base::timeout times{};
   times.handshake_timeout = request_time;
@@ -210,7 +210,7 @@ void PageConnection::follow() {
   if (!alone_) return;
   alone_.reset();
   pictures_ = 0;
-  base_.reset();  // which is none of those that all have been sent
+  base_.reset();  // no base: it is not among the pictures sent to all
   is_role_sent_ = false;
   send_news();
 }
@@ -234,7 +234,7 @@ Message PageConnection::own_picture() {
   return message;
 }
 
-/// The next one has its time by how long this one is.
+/// Sets the earliest time of the next picture by the length of this one.
 void PageConnection::note_picture(const Message& message) {
   picture_due_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(message.bytes->size()) *
                                                          nanoseconds_per_byte);
@@ -255,7 +255,7 @@ Message PageConnection::next_picture() {
 }
 
 void PageConnection::wait_for_picture() {
-  if (picture_timer_.expiry() == picture_due_) return;  // it waits already
+  if (picture_timer_.expiry() == picture_due_) return;  // already waiting
   picture_timer_.expires_at(picture_due_);
   picture_timer_.async_wait([self = shared_from_this()](const ErrorCode& problem) {
     if (!problem) self->send_news();

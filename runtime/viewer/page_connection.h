@@ -1,4 +1,4 @@
-// One connection to a viewer.
+// Connection to a viewer.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -22,23 +22,24 @@ namespace palpate {
 
 class PageConnection;
 
-/// The server as its connections see it, on its thread.
+/// Server as its connections see it, on its thread.
 class PageHost {
  public:
   virtual ~PageHost() = default;
 
   [[nodiscard]] virtual const ServedAddress& served() const noexcept = 0;
   [[nodiscard]] virtual ShownRun& run(std::size_t number) = 0;
-  /// Whether another connection that has shown the token may be answered.
+  /// True if another connection with the token may be answered.
   [[nodiscard]] virtual bool has_room() const = 0;
-  /// It is gone, and its control with it.
+  /// Removes a closed connection, with its control.
   virtual void leave(PageConnection& page) = 0;
 };
 
-/// One request, and where that asks for it a socket from then on: a page. For the server's thread.
+/// HTTP connection: one request, after which it may become a WebSocket, that is, a page. For the server's
+/// thread.
 class PageConnection : public Received, public Page, public std::enable_shared_from_this<PageConnection> {
  public:
-  /// `server` must live as long.
+  /// `server` must outlive this.
   PageConnection(boost::asio::ip::tcp::socket socket, PageHost& server)
       : stream_(std::move(socket)), server_(server), picture_timer_(stream_.get_executor()) {}
 
@@ -49,7 +50,7 @@ class PageConnection : public Received, public Page, public std::enable_shared_f
   void look_alone(DrawnPicture picture, std::int64_t frame) override;
   void follow() override;
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept override;
-  /// The run that it asks for; null before it has shown the token.
+  /// Run that it asked for; null before it has shown the token.
   [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   [[nodiscard]] bool is_stalled() const override;
 
@@ -82,23 +83,23 @@ class PageConnection : public Received, public Page, public std::enable_shared_f
   std::size_t said_bytes_ = 0;
   Message writing_;
   std::chrono::steady_clock::time_point writing_since_;
-  // What it has been sent.
+  // Content that was sent to the page.
   std::int64_t scenes_ = 0;
   std::int64_t pictures_ = 0;
   std::int64_t states_ = 0;
   std::int64_t ticks_ = 0;
   std::uint32_t patch_ = 0;
-  std::shared_ptr<const WireValues> base_;  // of the last picture; null: none of this scene
+  std::shared_ptr<const WireValues> base_;  // values of the last picture; null: none of this scene
   struct Alone {
     DrawnPicture picture;
     std::int64_t frame = 0;
     bool is_sent = false;
   };
-  std::optional<Alone> alone_;  // what it sees in the place of what all see
+  std::optional<Alone> alone_;  // picture that it sees instead of the common one
   bool is_role_sent_ = true;
   boost::asio::steady_timer picture_timer_;
-  std::chrono::steady_clock::time_point picture_due_;  // no picture before: what was sent has its time
-  bool ticks_first_ = true;                            // else pictures
+  std::chrono::steady_clock::time_point picture_due_;  // earliest next picture, for the data rate
+  bool ticks_first_ = true;                            // next in turn: ticks, otherwise pictures
 };
 
 }  // namespace palpate

@@ -48,7 +48,7 @@ void PageServer::tick() {
 }
 
 void PageServer::work() {
-  // Its starter may be the loop's thread.
+  // It may have been started by the loop's thread.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   pthread_setname_np(pthread_self(), "viewer");

@@ -1,4 +1,4 @@
-// The viewer's thread.
+// Server thread of the viewer.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -20,10 +20,10 @@
 
 namespace palpate {
 
-/// Answers connections, and has each run take what is posted to its pages.
+/// Answers connections, and passes posted content to each run.
 class PageServer : public PageHost {
  public:
-  /// As ViewerServer.
+  /// See ViewerServer.
   PageServer(ViewerPort port, const std::vector<RunToShow>& runs);
   ~PageServer() override;  ///< closes all connections
   PageServer(const PageServer&) = delete;
@@ -31,7 +31,7 @@ class PageServer : public PageHost {
 
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
 
-  /// `put` puts something into the mail of a run, by any thread.
+  /// Calls `put` with the mail of a run; for any thread.
   template <class Put>
   void post(std::size_t run, Put&& put) {
     if (runs_[run]->post(std::forward<Put>(put))) boost::asio::post(context_, [this] { take_mail(); });

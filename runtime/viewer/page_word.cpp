@@ -13,18 +13,18 @@ using Json = nlohmann::json;
 constexpr int deepest = 4;
 constexpr double farthest = 1e6;  // [m]
 constexpr double quaternion_error = 0.01;
-constexpr std::int64_t most_frames = std::int64_t{1} << 53;  // integers that JavaScript has
+constexpr std::int64_t most_frames = std::int64_t{1} << 53;  // largest exact integer of JavaScript
 
 constexpr std::array<const char*, 10> names = {"point",  "pause",  "step",    "reset", "acknowledge",
                                                "change", "record", "control", "seek",  "follow"};
 static_assert(names.size() == std::variant_size_v<PageWord>);
 
-/// What is wrong with a word; only in here.
+/// Reason why a word is invalid; used in this file only.
 struct Problem {
   std::string text;
 };
 
-/// The object has just `type` and these.
+/// Checks that the object has `type`, `members` and no others.
 void expect_members(const Json& object, std::initializer_list<const char*> members) {
   for (const char* member : members) {
     if (!object.contains(member)) throw Problem{std::string("has no member ") + member};
@@ -132,7 +132,7 @@ std::optional<PageWord> parse_page_word(std::string_view text, std::string& prob
     problem = "the message is longer than 16 KiB";
     return std::nullopt;
   }
-  if (text.find('\0') != std::string_view::npos) {  // which the parser takes for the end
+  if (text.find('\0') != std::string_view::npos) {  // the parser would take it for the end
     problem = "the message is not JSON";
     return std::nullopt;
   }

@@ -1,4 +1,4 @@
-// What a page says (web/PROTOCOL.md).
+// Messages from a page (web/PROTOCOL.md).
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// No word of a page is longer [bytes].
+/// Largest size of a page's message [byte].
 inline constexpr std::size_t longest_page_word = 16384;
 
 struct PointWord {
@@ -40,11 +40,11 @@ struct FollowWord {};
 using PageWord = std::variant<PointWord, PauseWord, StepWord, ResetWord, AcknowledgeWord, ChangeWord,
                               RecordWord, ControlWord, SeekWord, FollowWord>;
 
-/// What a word is called in messages: its `type`.
+/// Returns the message's `type`.
 const char* name_of(const PageWord& word) noexcept;
 
-/// Only a word that the protocol has, with all its members and no others, with finite positions of at most
-/// 1e6 m and unit quaternions (to 1 %, made exact), is one. Else nothing, and `problem` says why in ASCII.
+/// Parses a message of the protocol: all its members and no others, finite positions of at most 1e6 m, unit
+/// quaternions (to 1 %, normalised). Otherwise returns nothing and writes the reason, in ASCII, to `problem`.
 std::optional<PageWord> parse_page_word(std::string_view text, std::string& problem);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// The JSON that the runtime says to a page (web/PROTOCOL.md).
+// JSON messages from the runtime to a page (web/PROTOCOL.md).
 #pragma once
 
 #include <cstdint>
@@ -10,38 +10,39 @@
 
 namespace palpate {
 
-/// What a page is to the run.
+/// Role of a page in its run.
 struct PageRole {
   bool is_controller = false;
-  bool controlled = false;                     ///< whether any page is
-  std::size_t pages = 0;                       ///< all that watch
-  std::optional<std::int64_t> own_frame = {};  ///< of a recording, where it sees another than all
+  bool controlled = false;                     ///< true if any page has control
+  std::size_t pages = 0;                       ///< number of pages that watch
+  std::optional<std::int64_t> own_frame = {};  ///< frame of a recording that it sees by itself
 };
 
-/// The first message of all. `mode`: live, replay or file. `has_book`: the page's help can open the book.
+/// First message to a page. `mode`: live, replay or file. `has_book`: the page's help can open the book.
 std::string hello_word(const char* mode, std::uint64_t page, bool has_book = false);
 
-/// What is wrong, where, and what to do about it: the members `what`, `where` and `hint`.
+/// Members `what`, `where` and `hint` of an error message.
 nlohmann::json error_members(const Error& error);
 
-/// The message of an Error, with its kind where it is a PageError. `about`: the word of the page that could
-/// not be.
+/// Message for an Error, with its kind if it is a PageError. `about`: the page's message that failed.
 std::string error_word(const std::string& about, const Error& error);
 
-/// Ticks a second where a run does not say.
+/// Ticks per second if a run does not state them.
 inline constexpr double usual_rate = 1000.0;
 
-/// The message `state`: the members that are the run's, to which those of each page are added.
+/// Message `state`: the members common to all pages, to which each page's own are added.
 class StateWord {
  public:
-  /// Throws Error when the text is not a JSON object.
+  /// Throws Error if the text is not a JSON object.
   explicit StateWord(const std::string& json);
 
-  /// `times` of a replay's frames, which a page needs once, null without; the state itself is without.
+  /// `times` of a replay's frames, which a page needs once; null if absent. They are not part of the state
+  /// itself.
   [[nodiscard]] const nlohmann::json& times() const noexcept { return times_; }
-  [[nodiscard]] double rate() const;  ///< ticks a second
+  [[nodiscard]] double rate() const;  ///< ticks per second
 
-  /// With the page's own members. The pointer is this page's where the run has one and the page controls.
+  /// Returns the message with the page's own members. The pointer belongs to this page if the run has one and
+  /// the page controls it.
   [[nodiscard]] std::string for_page(std::uint32_t scene, const PageRole& role,
                                      const nlohmann::json& times) const;
 

@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-/// What a word asks of the run.
+/// Passes a page's message on to the run.
 struct Ask {
   ViewedRun& run;
   void operator()(const PointWord& word) const { run.point(word.wanted); }
@@ -18,9 +18,9 @@ struct Ask {
   void operator()(const AcknowledgeWord&) const { run.acknowledge(); }
   void operator()(const ChangeWord& word) const { run.change(word.settings); }
   void operator()(const RecordWord& word) const { run.record(word.on); }
-  void operator()(const ControlWord&) const {}  // is between pages
+  void operator()(const ControlWord&) const {}  // between pages
   void operator()(const SeekWord& word) const { run.seek(word.frame); }
-  void operator()(const FollowWord&) const {}  // is the page's own
+  void operator()(const FollowWord&) const {}  // of the page alone
 };
 
 }  // namespace
@@ -90,7 +90,7 @@ void ShownRun::hand_over(Page& page, bool take) {
   }
 }
 
-/// Who only watches a replay still looks at what it likes.
+/// A page without control may view any frame of a replay by itself.
 void ShownRun::show_alone(Page& page, std::int64_t frame) {
   std::optional<RecordedFrame> recorded = run_.recorded_frame(frame);
   if (recorded && broadcast_.picture()) {
@@ -118,7 +118,7 @@ void ShownRun::obey(Page& page, const PageWord& word) {
     }
   } catch (const Error& error) {
     page.say(error_word(name, error));
-  } catch (const std::exception& error) {  // no memory, say: the run goes on
+  } catch (const std::exception& error) {  // e.g. out of memory: the run goes on
     page.say(error_word(name, Error(error.what(), "", "")));
   }
 }

@@ -1,4 +1,4 @@
-// A run and the pages that see it.
+// Run with the pages that watch it.
 #pragma once
 
 #include <cstdint>
@@ -15,34 +15,34 @@
 
 namespace palpate {
 
-/// A page as its run sees it.
+/// Page as its run sees it.
 class Page {
  public:
   virtual ~Page() = default;
 
-  /// Sends what there is that the page has not been sent, one message after the other.
+  /// Sends the content that the page has not received yet, one message at a time.
   virtual void send_news() = 0;
-  /// A text that it must not miss.
+  /// Queues a text that must not be dropped.
   virtual void say(std::string text) = 0;
-  /// It sees this from now on, whatever is shown to all.
+  /// Shows this picture to the page alone from now on.
   virtual void look_alone(DrawnPicture picture, std::int64_t frame) = 0;
-  /// It sees what is shown to all.
+  /// Returns to the picture shown to all.
   virtual void follow() = 0;
-  /// The frame that it sees alone.
+  /// Frame that it sees by itself.
   [[nodiscard]] virtual std::optional<std::int64_t> own_frame() const noexcept = 0;
 };
 
-/// Knows which pages see the run and which of them controls it, and takes what is posted to them. All except
-/// `post` is for the server's thread.
+/// Knows the pages that watch a run and the one that controls it, and takes the content posted to them. All
+/// except `post` is for the server's thread.
 class ShownRun {
  public:
-  /// `run` must live as long. `has_book`: pages may open the book.
+  /// `run` must outlive this. `has_book`: pages may open the book.
   ShownRun(ViewedRun& run, bool is_replay, bool has_book)
       : run_(run), is_replay_(is_replay), has_book_(has_book) {}
   ShownRun(const ShownRun&) = delete;
   ShownRun& operator=(const ShownRun&) = delete;
 
-  /// `put` puts something into the mail, by any thread. True where the server's thread is to be woken.
+  /// Calls `put` with the mail; for any thread. Returns true if the server's thread must be woken.
   template <class Put>
   [[nodiscard]] bool post(Put&& put) {
     return mailbox_.post(std::forward<Put>(put));
@@ -51,15 +51,15 @@ class ShownRun {
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
   [[nodiscard]] Broadcast& broadcast() noexcept { return broadcast_; }
   [[nodiscard]] PageRole role(const Page& page) const;
-  /// It is a socket now: the only one of all has control.
+  /// Adds a page whose WebSocket is open. The only page gets control.
   void join(Page& page);
-  /// It is gone, and its control with it.
+  /// Removes a closed page, with its control.
   void leave(Page& page);
-  /// What the controller wants is done, others are told why not.
+  /// Executes a message of the controlling page; sends other pages the reason for refusing it.
   void obey(Page& page, const PageWord& word);
-  /// Shows what was posted.
+  /// Shows the posted content.
   void take_mail();
-  /// Has the state sent again where that was last half a second ago.
+  /// Sends the state again if that was last done half a second ago.
   void repeat_state();
 
  private:
@@ -73,7 +73,7 @@ class ShownRun {
   bool is_replay_;
   bool has_book_;
   Broadcast broadcast_;
-  std::set<Page*> open_;  // those that are sockets
+  std::set<Page*> open_;  // pages with an open WebSocket
   Page* controller_ = nullptr;
   std::uint64_t joined_ = 0;
   Mailbox mailbox_;

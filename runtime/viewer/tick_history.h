@@ -1,4 +1,4 @@
-// The last ticks, for pages that may take them late.
+// History of ticks, for pages that read them late.
 #pragma once
 
 #include <algorithm>
@@ -11,11 +11,10 @@
 
 namespace palpate {
 
-/// Ticks in the order in which they came, the oldest forgotten. Each has a place, counted from the very
-/// first.
+/// Ticks in order of arrival; the oldest are dropped. Each has an index, counted from the very first.
 class TickHistory {
  public:
-  /// `ticks` are `stride` apart. Of all, the last `most` are kept.
+  /// Appends ticks that are `stride` apart. At most the last `most` are kept.
   void append(std::span<const TickNote> ticks, std::int64_t stride, std::size_t most) {
     for (const TickNote& tick : ticks) samples_.push_back({tick, stride});
     while (samples_.size() > most) forget_first();
@@ -25,18 +24,18 @@ class TickHistory {
   }
 
   [[nodiscard]] std::int64_t end() const noexcept { return first_ + std::ssize(samples_); }
-  /// Whether any that is kept is at a place or later.
+  /// True if a stored tick has index `place` or a later one.
   [[nodiscard]] bool has_from(std::int64_t place) const noexcept {
     return !samples_.empty() && place < end();
   }
 
-  /// Ticks without a gap.
+  /// Consecutive ticks without a gap.
   struct Run {
     std::vector<TickNote> ticks;
     std::int64_t stride = 1;
-    std::int64_t end = 0;  ///< place after the last
+    std::int64_t end = 0;  ///< index after the last
   };
-  /// Those from a place on, or from the first that is kept; none at the end.
+  /// Returns the run from index `place` on, or from the first stored one; empty at the end.
   [[nodiscard]] Run run_from(std::int64_t place) const {
     Run run;
     run.end = std::max(place, first_);
@@ -63,7 +62,7 @@ class TickHistory {
   }
 
   std::deque<Sample> samples_;
-  std::int64_t first_ = 0;  // place of the oldest
+  std::int64_t first_ = 0;  // index of the oldest
 };
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// What a person at the viewer's page may ask of a run.
+// Requests that a person at the viewer's page can make of a run.
 #pragma once
 
 #include <array>
@@ -14,15 +14,15 @@
 
 namespace palpate {
 
-/// Options of play by name, as text; nothing: the default.
+/// Options of play by name, as text; empty: the default.
 using SettingsChange = std::map<std::string, std::optional<std::string>>;
 
-/// Why what a page asks for is not done.
+/// Reason why a request of a page is refused.
 enum class PageRefusal : std::uint8_t {
-  value,    ///< it cannot be: a number out of its bounds, an option that does not exist
-  control,  ///< another page steers, or none
-  hand,     ///< a hand is in the device, and this is not a page's to change
-  locked,   ///< not now: a recording is being made, or a session replayed
+  value,    ///< invalid: a number out of bounds, an option that does not exist
+  control,  ///< another page has control, or none
+  hand,     ///< a hand is in the device, and the page must not change this
+  locked,   ///< not possible during a recording or a replay
 };
 
 /// The refusals and their names in messages.
@@ -33,7 +33,7 @@ inline constexpr std::array<std::pair<PageRefusal, const char*>, 4> page_refusal
     {PageRefusal::locked, "locked"},
 }};
 
-/// An Error of which the page is told the kind; any other Error is of kind `value`.
+/// Error with the kind that the page receives; any other Error has the kind `value`.
 class PageError : public Error {
  public:
   PageError(PageRefusal reason, const std::string& what, std::string where, std::string hint)
@@ -45,37 +45,37 @@ class PageError : public Error {
   PageRefusal reason_;
 };
 
-/// A frame of a recording.
+/// Frame of a recording.
 struct RecordedFrame {
   std::int64_t frame = 0;
   SurfacePicture picture;
 };
 
-/// Called by the server's thread; no call waits for the loop. Those that can be wrong throw Error, whose text
-/// the page is shown.
+/// Requests to a run, called by the server's thread; none waits for the loop. An invalid one throws Error,
+/// whose text the page shows.
 class ViewedRun {
  public:
   virtual ~ViewedRun() = default;
 
   virtual void point(const PointerPose& wanted) = 0;
-  virtual void lose_pointer() = 0;  ///< the controller is gone
+  virtual void lose_pointer() = 0;  ///< the controlling page is gone
   virtual void pause(bool paused) = 0;
-  virtual void step_once() = 0;  ///< a tick, while paused
-  virtual void reset() = 0;      ///< the untouched body
+  virtual void step_once() = 0;  ///< one tick, while paused
+  virtual void reset() = 0;      ///< restores the untouched body
   virtual void acknowledge() = 0;
   virtual void change(const SettingsChange& settings) = 0;
   virtual void record(bool on) = 0;
-  virtual void seek(std::int64_t frame) = 0;  ///< in a replay
-  /// The nearest frame that a replay has, for a page that looks through it by itself; all others see what
-  /// they saw. Nothing where there is no replay.
+  virtual void seek(std::int64_t frame) = 0;  ///< in a replay only
+  /// Returns the nearest frame of a replay, for a page that views it by itself; the other pages are
+  /// unaffected. Empty if there is no replay.
   virtual std::optional<RecordedFrame> recorded_frame(std::int64_t frame) {
     static_cast<void>(frame);
     return std::nullopt;
   }
 };
 
-/// A run that is shown; `run` must live as long as it is. `is_replay`: of what was recorded, where all ticks
-/// are kept for pages that come later.
+/// Run that is shown; `run` must outlive this. `is_replay`: recorded, so that all ticks are kept for pages
+/// that join later.
 struct RunToShow {
   ViewedRun& run;
   bool is_replay = false;

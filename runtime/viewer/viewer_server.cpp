@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t most_waiting = 1024;  // calls of show_ticks that nobody has looked at
+constexpr std::size_t most_waiting = 1024;  // calls of show_ticks not yet taken
 
 }  // namespace
 
@@ -18,8 +18,8 @@ struct ViewerServer::Impl {
   Impl(ViewerPort port, const std::vector<RunToShow>& runs)
       : shown(runs.size()), server(std::move(port), runs) {}
 
-  std::mutex mutex;                   // of what is shown
-  std::vector<PictureDrawing> shown;  // of each run
+  std::mutex mutex;                   // guards `shown`
+  std::vector<PictureDrawing> shown;  // one per run
   PageServer server;
 };
 

@@ -1,4 +1,4 @@
-// Serves the viewer's page, its pictures and its requests.
+// Server of the viewer's page, pictures and requests.
 #pragma once
 
 #include <cstddef>
@@ -16,30 +16,30 @@
 
 namespace palpate {
 
-/// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
-/// thread; they never wait for a page. A page that is slow misses pictures, and holds up nothing else.
+/// HTTP and WebSocket server in a thread of its own (web/PROTOCOL.md). Any thread may call the `show`
+/// functions; they never wait for a page. A slow page misses pictures and delays nothing else.
 class ViewerServer {
  public:
-  /// Serves who waits at the port and who comes later. Two runs are shown side by side; the functions below
-  /// are told which by its place in `runs`.
+  /// Serves clients that already wait at the port and later ones. Two runs are shown side by side; `run` in
+  /// the functions below is the index in `runs`.
   ViewerServer(ViewerPort port, const std::vector<RunToShow>& runs);
   ~ViewerServer();  ///< closes all connections
   ViewerServer(const ViewerServer&) = delete;
   ViewerServer& operator=(const ViewerServer&) = delete;
 
-  /// As ViewerPort.
+  /// See ViewerPort::url.
   [[nodiscard]] const std::string& url() const noexcept;
 
-  /// All that is shown from now on is of this scene.
+  /// Sets the scene of all content shown from now on.
   void show_scene(std::shared_ptr<const Scene> scene, std::size_t run = 0);
-  /// A picture without values for all nodes of the scene is not shown. `body`, which the scene is of, is used
-  /// during the call only, to draw the picture's overlay: null for none.
+  /// Shows a picture; one without values for all nodes of the scene is ignored. `body`, to which the scene
+  /// belongs, is used only during the call to draw the picture's overlay; null for none.
   void show_picture(SurfacePicture picture, const Body* body = nullptr, std::size_t run = 0);
-  /// Ticks `stride` apart. Live, pages are sent the last two seconds at most.
+  /// Shows ticks that are `stride` apart. In a live run, pages receive at most the last two seconds.
   void show_ticks(std::span<const TickNote> ticks, std::int64_t stride = 1, std::size_t run = 0);
-  /// The members of the message `state` that are the run's, as a JSON object; the server adds those that are
-  /// each page's (`pointer` says whether the run's device is a pointer). `times` of a replay are kept for
-  /// pages that come later. Throws Error when it is not an object.
+  /// Shows the common members of the message `state`, given as a JSON object; the server adds those of each
+  /// page (`pointer` says whether the run's device is a pointer). `times` of a replay are kept for pages that
+  /// join later. Throws Error if it is not an object.
   void show_state(const std::string& json, std::size_t run = 0);
 
  private:

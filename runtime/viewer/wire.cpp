@@ -57,7 +57,7 @@ void add_bytes_of(WireMessage& message, const std::vector<std::uint8_t>& numbers
   for (const std::uint8_t number : numbers) message.add(number);
 }
 
-/// What follows a scene of several materials.
+/// Appends the part of a scene with several materials.
 void add_materials(WireMessage& message, const Scene& scene) {
   const InnerSurface& inner = scene.inner;
   message.pad();
@@ -70,7 +70,7 @@ void add_materials(WireMessage& message, const Scene& scene) {
   add_bytes_of(message, inner.outside);
 }
 
-/// The place of each node in the order of the scene.
+/// Returns the index of each node in the order of the scene.
 std::vector<std::uint32_t> places_in_order(const Scene& scene) {
   std::vector<std::uint32_t> places(scene.order.size());
   for (std::size_t k = 0; k < places.size(); ++k)

@@ -1,4 +1,4 @@
-// The binary messages of the viewer (web/PROTOCOL.md).
+// Binary messages of the viewer (web/PROTOCOL.md).
 #pragma once
 
 #include <cstdint>
@@ -12,18 +12,18 @@
 
 namespace palpate {
 
-/// Each as the bytes of one message.
+/// Each returns the bytes of one message.
 std::string encode_scene(const Scene& scene);
 std::string encode_patch(std::uint32_t scene, const ScenePatch& patch);
 
-/// A picture that fits: `values` are its own, of which only what differs from `base` is in the message (null:
-/// all of them). Who reads it must have that base.
+/// Encodes a picture that fits. `values` are its own, of which only the difference from `base` is in the
+/// message (null: all of them). The reader must have that base.
 std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch,
                          const WireValues& values, const WireValues* base);
-/// Picture number 1, for a reader that has nothing.
+/// Encodes picture number 1, for a reader without a base.
 std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
-/// Ticks that are `stride` apart, at least one.
+/// Encodes ticks that are `stride` apart; at least one.
 std::string encode_ticks(std::uint32_t scene, std::span<const TickNote> ticks, std::int64_t stride);
 
 }  // namespace palpate

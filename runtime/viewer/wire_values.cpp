@@ -12,25 +12,25 @@
 namespace palpate {
 namespace {
 
-constexpr double least_displacement = 5000.0;  // that the largest one is, in units; below twice that
+constexpr double least_displacement = 5000.0;  // least size of the largest one in units; below twice that
 constexpr double least_stress = 4096.0;
-constexpr int most_shift = 8;  // by more a base is no help, and its numbers would outgrow their bits
+constexpr int most_shift = 8;  // beyond it a base is no help, and its numbers would overflow
 
-constexpr std::size_t block = 32;  // numbers of one parameter
+constexpr std::size_t block = 32;  // numbers with a common Rice parameter
 constexpr unsigned parameter_bits = 5;
-constexpr std::uint32_t run_of_zeros = 31;  // in the place of a parameter: no number has as many bits
+constexpr std::uint32_t run_of_zeros = 31;  // in place of a parameter: no number has as many bits
 constexpr unsigned run_bits = 12;
 constexpr std::size_t longest_run = 1U << run_bits;  // blocks
 
-/// So that `largest` is at least `least` units and less than twice that.
+/// Returns the exponent for which `largest` is at least `least` units and less than twice that.
 std::int32_t exponent_for(double largest, double least) {
   return largest > 0.0 ? std::ilogb(largest / least) : 0;
 }
 
-/// Writes from the lowest bit of each byte up.
+/// Writes bits, from the lowest of each byte up.
 class BitWriter {
  public:
-  /// The lowest `bits` of `number`, at most 32; the others are 0.
+  /// Appends the lowest `bits` of `number`, at most 32; its other bits are 0.
   void add(std::uint32_t number, unsigned bits) {
     waiting_ |= std::uint64_t{number} << count_;
     count_ += bits;
@@ -54,7 +54,8 @@ class BitWriter {
   unsigned count_ = 0;
 };
 
-/// Blocks of numbers by Rice's code, with the parameter that suits each; several blocks of zeros in one.
+/// Writes blocks of numbers in Rice code, each with the best parameter; several blocks of zeros become one
+/// run.
 class BlockWriter {
  public:
   explicit BlockWriter(std::size_t numbers) { bits_.reserve(numbers); }
@@ -64,7 +65,7 @@ class BlockWriter {
     block_[count_] = number < 0 ? ~doubled : doubled;
     if (++count_ == block) end_block();
   }
-  /// Fills up with zeros.
+  /// Fills the last block with zeros.
   void end_channel() {
     if (count_ == 0) return;
     std::fill(block_.begin() + static_cast<std::ptrdiff_t>(count_), block_.end(), 0U);
@@ -89,7 +90,7 @@ class BlockWriter {
     bits_.add(parameter, parameter_bits);
     for (const std::uint32_t number : block_) add_number(number, parameter);
   }
-  /// Around the mean's number of bits.
+  /// Tries the parameters around the bit width of the mean.
   [[nodiscard]] unsigned best_parameter(std::uint64_t sum) const {
     const auto middle = static_cast<unsigned>(std::bit_width(sum / block));
     unsigned best = 0;
@@ -103,7 +104,7 @@ class BlockWriter {
     }
     return best;
   }
-  /// Ones, as often as 2^parameter is in it, a zero, and what is left over.
+  /// Appends the quotient by 2^parameter in ones, a zero, and the remainder.
   void add_number(std::uint32_t number, unsigned parameter) {
     constexpr unsigned most_ones = 31;
     std::uint32_t ones = number >> parameter;
@@ -121,16 +122,16 @@ class BlockWriter {
   BitWriter bits_;
   std::array<std::uint32_t, block> block_{};
   std::size_t count_ = 0;
-  std::size_t zeros_ = 0;  // blocks that wait
+  std::size_t zeros_ = 0;  // pending blocks
 };
 
-/// What a number of the base would be in a unit that is 2^shift as large.
+/// Converts a number of the base to a unit that is 2^shift times as large.
 std::int32_t in_other_unit(std::int32_t number, int shift) {
   if (shift <= 0) return number * (1 << -shift);
   return (number + (1 << (shift - 1))) >> shift;
 }
 
-/// `is_stress`: 0 is no number, and what is known begins at 1.
+/// `is_stress`: 0 means unknown, and known values start at 1.
 void add_channel(BlockWriter& writer, const std::vector<std::int32_t>& values,
                  const std::vector<std::int32_t>* base, int shift, bool is_stress, std::size_t first,
                  std::size_t end) {
