@@ -1,4 +1,4 @@
-// How the C functions tell that something could not be done.
+// Error reporting of the C functions.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 
 namespace palpate {
 
-/// Cut to `size` bytes with the zero at its end.
+/// Copies text, cut to `size` bytes including the terminating zero.
 void copy_text(std::string_view text, char* to, std::size_t size) noexcept;
 
-/// What this thread's last call that takes `error` came to.
+/// Sets the result of this thread's last call that takes `error`.
 void set_last_code(int code) noexcept;
 
-/// Runs `work(code)`, which may set `code` to what a failure is from then on; it begins as
-/// PALPATE_ERROR_ARGUMENT. Returns PALPATE_OK, or the code with the reason in `error`. `place` is the
-/// function and `if_no_memory` a hint, as in handled_error.
+/// Runs `work(code)`, which may set the `code` that a later failure has; it starts as PALPATE_ERROR_ARGUMENT.
+/// Returns PALPATE_OK, or the code with the reason in `error`. `place` is the function's name and
+/// `if_no_memory` a hint, as in handled_error.
 template <typename Work>
 int tell_failure(const char* place, const char* if_no_memory, char* error, std::size_t error_size,
                  Work&& work) noexcept {
@@ -33,7 +33,7 @@ int tell_failure(const char* place, const char* if_no_memory, char* error, std::
       throw;
     } catch (const std::bad_alloc&) {
       code = PALPATE_ERROR_MEMORY;
-    } catch (const Error&) {  // as `work` has it
+    } catch (const Error&) {  // code set by `work`
     } catch (const std::filesystem::filesystem_error&) {
       code = PALPATE_ERROR_FILE;
     } catch (...) {

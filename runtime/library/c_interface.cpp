@@ -1,4 +1,4 @@
-// The C functions of palpate.h over the C++ step.
+// C functions of palpate.h, on top of the C++ step.
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -108,7 +108,7 @@ palpate_result to_result(const ToolState& state) noexcept {
   return result;
 }
 
-/// Element `k`, called `name`, of an array of structs that the macro `init` initializes.
+/// Reads element `k`, called `name`, of an array of structs that the macro `init` initializes.
 template <typename Struct>
 Struct read_or_throw(const Struct* first, std::size_t k, const Struct& defaults, const std::string& name,
                      const std::string& init, const char* place = "palpate_create") {
@@ -138,7 +138,7 @@ StateOptions read_tools(const palpate_tool* tools, int tool_count, int max_conta
   return options;
 }
 
-/// An overlay that is not asked for has refinement 1.
+/// Reads overlay options; without an overlay the refinement is 1.
 palpate_overlay read_overlay(const palpate_overlay* given) {
   if (given == nullptr) return {.size = sizeof(palpate_overlay), .refinement = 1, .rings = 0, .memory = 0};
   const palpate_overlay overlay =
@@ -160,7 +160,7 @@ std::int64_t read_stress_ticks(std::int64_t ticks) {
               "ask for 1 or more, or for 0 to have none");
 }
 
-/// Ticks a second of a session that is recorded.
+/// Ticks per second of a session that is recorded.
 std::int64_t whole_rate(double tick) {
   const double rate = std::round(1.0 / tick);
   if (tick_rates.contains(rate) && std::abs(rate * tick - 1.0) < 1e-9) return static_cast<std::int64_t>(rate);
@@ -169,12 +169,12 @@ std::int64_t whole_rate(double tick) {
               "palpate_record", "create the session with another options.tick");
 }
 
-/// What a replay of the session needs.
+/// Settings that a replay of the session needs.
 Settings settings_of(const Tool& tool, const StateOptions& options, const palpate_overlay& overlay,
                      ContactModel contact) {
   Settings settings;
   settings.tool = tool;
-  settings.reach = std::max(tool.reach, std::numeric_limits<double>::min());  // none is not to be said there
+  settings.reach = std::max(tool.reach, std::numeric_limits<double>::min());  // 0 is not allowed there
   settings.max_contacts = options.max_contacts;
   settings.contact = contact;
   if (overlay.refinement > 1)
@@ -184,7 +184,7 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
   return settings;
 }
 
-/// Where a session of `model`, loaded from `loaded`, may record: by the rules of the programs' outputs.
+/// Checked output of a recording of `model`, loaded from `loaded`, by the same rules as for the programs.
 std::filesystem::path recording_output(const Model& model, const std::filesystem::path& loaded,
                                        const char* wanted) {
   OutputPaths paths;
@@ -193,9 +193,9 @@ std::filesystem::path recording_output(const Model& model, const std::filesystem
   return paths.add(wanted, OutputKind::recording, "palpate_record");
 }
 
-/// Whether a tool can become another between two ticks: its shape stays, and all else makes sense.
+/// True if a tool may change to `next` between two ticks: same shape, valid values.
 bool can_become(const Tool& tool, const Tool& next) noexcept {
-  const auto is_bound = [](double value) { return value > 0.0; };  // infinite for none
+  const auto is_bound = [](double value) { return value > 0.0; };  // infinite means unlimited
   const auto is_size = [](double value) { return std::isfinite(value) && value >= 0.0; };
   return tool.radius == next.radius && tool.length == next.length && tool.disc_radius == next.disc_radius &&
          is_bound(next.coupling_stiffness) && is_bound(next.coupling_torsion) && is_bound(next.max_force) &&
@@ -209,7 +209,7 @@ StateOptions with_room(StateOptions options, const Body& body, const palpate_ove
 
 }  // namespace
 
-/// What a tick left, for the eye.
+/// Result of a tick, for display.
 struct Shown {
   SurfaceLoad load;
   MotionSnapshot motion;
@@ -221,7 +221,7 @@ struct FoundStress {
   std::vector<float> von_mises, pressure;  // [S] [Pa]
 };
 
-/// What a palpate_session leads to.
+/// Contents of a palpate_session.
 struct OwnLoop {
   OwnLoop(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
           ContactModel contact, std::int64_t stress_ticks)
@@ -250,7 +250,7 @@ struct OwnLoop {
     }
   }
 
-  /// Hands what the last tick did over to the thread that draws.
+  /// Passes the result of the last tick to the thread that draws.
   void publish() noexcept {
     Shown& next = shown.next();
     next.load = state.surface.near.load();
@@ -271,14 +271,14 @@ struct OwnLoop {
   State state;
   std::vector<ToolPose> poses;
   Latest<Shown> shown;
-  std::mutex drawing;                       // one thread at a time
-  std::vector<double> stored_displacement;  // its scratch
+  std::mutex drawing;                       // held by the thread that draws
+  std::vector<double> stored_displacement;  // workspace for drawing
   std::vector<Vec3> displacement;
   std::optional<PatchSource> overlays;
   std::optional<MotionSource> motion;
   std::int64_t ticks = 0;
   Latest<FoundStress> stress{FoundStress{}};
-  std::optional<SurfaceFrames> frames;  // its thread hands stress over
+  std::optional<SurfaceFrames> frames;  // its thread publishes the stress
   std::optional<SessionRecording> recording;
   std::size_t recorded_tool = 0;
 };
@@ -293,17 +293,17 @@ struct palpate_session : Guarded<OwnLoop> {
 
 namespace {
 
-/// As one of the threads that only look.
+/// Enters a session as one of the threads that only read.
 Inside<OwnLoop> look(const palpate_session* session) noexcept {
-  return {const_cast<palpate_session*>(session), Use::shared};  // NOLINT: what it guards is not changed
+  return {const_cast<palpate_session*>(session), Use::shared};  // NOLINT: the guarded object is unchanged
 }
 
-/// Why a session could not be entered.
+/// Status code for a session that could not be entered.
 int refused(const palpate_session* session) noexcept {
   return session == nullptr ? -1 : PALPATE_ERROR_STATE;
 }
 
-/// The session of the thread that uses the functions of the loop. Throws Error where it is none.
+/// Returns the session of the thread that uses the functions of the loop. Throws Error if there is none.
 OwnLoop& expect(const Inside<OwnLoop>& loop, const palpate_session* session, const char* place, int& code) {
   if (loop) return *loop;
   if (session == nullptr) throw Error("there is no session", place, "make one by palpate_create");

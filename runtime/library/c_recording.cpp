@@ -1,4 +1,4 @@
-// The C functions that read recordings back.
+// C functions that read recordings.
 #include <algorithm>
 #include <memory>
 #include <mutex>
@@ -23,7 +23,7 @@ void copy(const double (&from)[n], double (&to)[n]) noexcept {
   std::copy_n(from, n, to);
 }
 
-/// What is on the body in a recording is on the hand here.
+/// Negates a vector: a recording has the force on the body, palpate.h that on the hand.
 template <std::size_t n>
 void oppose(const double (&from)[n], double (&to)[n]) noexcept {
   std::transform(from, from + n, to, [](double value) { return -value; });
@@ -48,13 +48,13 @@ palpate_recorded_tick tick_of(const TickRecord& record) noexcept {
 
 namespace palpate {
 
-/// What a palpate_recording leads to.
+/// Contents of a palpate_recording.
 struct ReadRecording {
   explicit ReadRecording(const char* name) : file(open_session(name)) {}
 
   RecordingFile file;
-  std::mutex reading;                        // of ticks and pictures
-  std::optional<RecordedPictures> pictures;  // from the first that is asked for on
+  std::mutex reading;                        // held while ticks and pictures are read
+  std::optional<RecordedPictures> pictures;  // made at the first request
 };
 
 }  // namespace palpate
@@ -65,12 +65,12 @@ struct palpate_recording : Guarded<ReadRecording> {
 
 namespace {
 
-/// Any number of threads look.
+/// Enters a recording; any number of threads may.
 Inside<ReadRecording> look(const palpate_recording* recording) noexcept {
-  return {const_cast<palpate_recording*>(recording), Use::shared};  // NOLINT: what it guards is not changed
+  return {const_cast<palpate_recording*>(recording), Use::shared};  // NOLINT: the guarded object is unchanged
 }
 
-/// Why a recording could not be entered.
+/// Status code for a recording that could not be entered.
 int refused(const palpate_recording* recording) noexcept {
   return recording == nullptr ? -1 : PALPATE_ERROR_STATE;
 }

@@ -1,4 +1,4 @@
-// What a pointer of palpate.h leads to: it stands between the threads that use it and the one that ends it.
+// Guard of an object of palpate.h, shared by the threads that use it and the one that ends it.
 #pragma once
 
 #include <unistd.h>
@@ -11,11 +11,11 @@
 
 namespace palpate {
 
-/// Whether a thread is the only one of its kind in a Guarded, or one of any number.
+/// Access of a thread to a Guarded: exclusive among threads of its kind, or shared.
 enum class Use : std::uint32_t { alone = 1U << 30U, shared = 1 };
 
-/// Keeps a T until it is ended and the last thread is out of it. The guard itself (some 32 bytes) stays for
-/// the whole process, so that a pointer to one that has ended is known as such.
+/// Keeps a T until it is ended and the last thread has left it. The guard itself (about 32 bytes) lives as
+/// long as the process, so that a pointer to an ended object is recognised.
 template <typename T>
 class Guarded {
  public:
@@ -26,8 +26,8 @@ class Guarded {
   Guarded(const Guarded&) = delete;
   Guarded& operator=(const Guarded&) = delete;
 
-  /// Null once it is ended, or where another thread is the only one already; else `leave` follows. Real-time
-  /// safe.
+  /// Returns the object; null if it has ended, or another thread already has exclusive access. Unless null,
+  /// `leave` must follow. Real-time safe.
   T* enter(Use use) noexcept {
     const auto which = static_cast<std::uint32_t>(use);
     const std::uint32_t before = use == Use::alone ? users_.fetch_or(which, std::memory_order_acquire)
@@ -38,16 +38,16 @@ class Guarded {
     return nullptr;
   }
 
-  /// Real-time safe unless it is ended meanwhile.
+  /// Leaves the object. Real-time safe unless it is ended meanwhile.
   void leave(Use use) noexcept {
     const auto which = static_cast<std::uint32_t>(use);
     if (users_.fetch_sub(which, std::memory_order_acq_rel) - which == ended)
-      delete value_.exchange(nullptr);  // NOLINT(cppcoreguidelines-owning-memory): it is this one's
+      delete value_.exchange(nullptr);  // NOLINT(cppcoreguidelines-owning-memory): owned by this
   }
 
-  /// Ends it, the first time: waits for the threads that are in it. Where one does not come out for seconds
-  /// (it is this one, in a signal handler), the last one out ends it. In a process that was forked since,
-  /// which has none of its threads, it stays.
+  /// Ends the object, once: waits for the threads inside. If one does not leave for seconds (it is this
+  /// thread, in a signal handler), the last thread to leave ends it. In a forked child, which has none of
+  /// those threads, it is kept.
   void end() noexcept {
     if (::getpid() != process_) return;
     users_.fetch_add(1);
@@ -62,14 +62,14 @@ class Guarded {
   static constexpr auto pause = std::chrono::microseconds(100);
   static constexpr int most_pauses = 50'000;
 
-  std::atomic<std::uint32_t> users_ = 0;  // their number, and the bits `ended` and Use::alone
+  std::atomic<std::uint32_t> users_ = 0;  // number of threads inside, and the bits `ended` and Use::alone
   std::atomic<T*> value_;
   Guarded* next_;
   const pid_t process_ = ::getpid();
-  inline static std::atomic<Guarded*> all_ = nullptr;  // what no pointer leads to is taken for a leak
+  inline static std::atomic<Guarded*> all_ = nullptr;  // keeps all guards reachable for leak checkers
 };
 
-/// A thread in a Guarded, for as long as this lives. Holds null where there is none or the thread may not.
+/// Access of a thread to a Guarded, for the lifetime of this. Holds null if access is refused.
 template <typename T>
 class Inside {
  public:

@@ -1,4 +1,4 @@
-// Palpate in your own loop, in C++17: palpate.h, which says what all of it means, with owners and exceptions.
+// Palpate in your own loop, in C++17: owners and exceptions on top of palpate.h, which documents the meaning.
 // Header only. Link libpalpate as for C.
 #ifndef PALPATE_HPP
 #define PALPATE_HPP
@@ -16,10 +16,10 @@
 
 namespace palpate {
 
-/// What could not be done (`what`), and what to do about it (`hint`).
+/// Failure of a function: reason (`what`) and remedy (`hint`).
 class Error : public std::runtime_error {
  public:
-  /// By what palpate_create says: lines "error: ..." and "hint: ..."; `code` is one of palpate_code.
+  /// Parses the text of palpate_create: lines "error: ..." and "hint: ..."; `code` is one of palpate_code.
   explicit Error(std::string_view told, int code = palpate_last_code())
       : std::runtime_error(part(told, "error: ")), hint_(part(told, "hint: ")), code_(code) {}
   [[nodiscard]] const std::string& hint() const noexcept { return hint_; }
@@ -37,20 +37,20 @@ class Error : public std::runtime_error {
   int code_;
 };
 
-/// Calls a function of palpate.h that puts its reason into `text` of this size. Throws Error where it fails.
+/// Calls a function of palpate.h that writes its reason into a text of this size. Throws Error if it fails.
 template <class Call>
 void check(Call&& call) {
   std::string error(4096, '\0');
   if (const int code = call(error.data(), error.size()); code != PALPATE_OK) throw Error(error.c_str(), code);
 }
 
-/// A file's name for C. Throws Error where it has a zero byte, at which C would cut it.
+/// Returns a file name for C. Throws Error if it has a zero byte, at which C would cut it.
 inline const char* c_name(const std::string& file) {
   if (file.find('\0') == std::string::npos) return file.c_str();
   throw Error("error: a file's name has a zero byte\nhint: Leave it out\n", PALPATE_ERROR_ARGUMENT);
 }
 
-/// Names of the status bits of a tick.
+/// Returns the names of the status bits of a tick.
 inline std::vector<std::string> status_names(std::uint32_t status) {
   std::vector<std::string> names;
   for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
@@ -60,14 +60,14 @@ inline std::vector<std::string> status_names(std::uint32_t status) {
   return names;
 }
 
-/// A tool with palpate.h's defaults: a point.
+/// Returns a tool with palpate.h's defaults: a point, or a sphere of `radius` [m].
 inline palpate_tool make_tool(double radius = 0.0) {
   palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = radius;
   return tool;
 }
 
-/// A pose at a place [m], not turned.
+/// Returns a pose at a position [m], without rotation.
 inline palpate_pose make_pose(double x, double y, double z, bool grab = false) {
   palpate_pose pose = PALPATE_POSE_INIT;
   pose.position[0] = x;
@@ -81,14 +81,14 @@ inline palpate_options make_options() {
   return PALPATE_OPTIONS_INIT;
 }
 
-/// Stress and pressure at the surface nodes, as they were found last.
+/// Latest stress and pressure at the surface nodes.
 struct SurfaceStress {
-  std::int64_t tick = -1;        ///< that they belong to, from 0; -1: none yet
-  std::vector<float> von_mises;  ///< [nodes] [Pa]; not a number where it is not known
+  std::int64_t tick = -1;        ///< tick that they belong to, from 0; -1: none yet
+  std::vector<float> von_mises;  ///< [nodes] [Pa]; NaN where unknown
   std::vector<float> pressure;   ///< [nodes] [Pa]
 };
 
-/// One body and the tools that touch it. Threads as in palpate.h: one steps, others may draw.
+/// Body with the tools that touch it. Threads as in palpate.h: one steps, others may draw.
 class Session {
  public:
   /// Loads a baked file. Throws Error.
@@ -106,23 +106,24 @@ class Session {
 
   [[nodiscard]] std::size_t tools() const noexcept { return tools_; }
 
-  /// One tick of a session with one tool. Status bits; of a session with more, nothing happens but
-  /// PALPATE_POSE_NOT_FINITE. Real-time safe.
+  /// Performs one tick of a session with one tool and returns status bits. With more tools nothing happens
+  /// and it returns PALPATE_POSE_NOT_FINITE. Real-time safe.
   std::uint32_t step(const palpate_pose& pose) noexcept { return step(&pose, 1); }
-  /// One tick, a pose for each tool. Status bits; where the number is another, nothing happens but
-  /// PALPATE_POSE_NOT_FINITE. Real-time safe.
+  /// Performs one tick with a pose for each tool and returns status bits. With another number of poses
+  /// nothing happens and it returns PALPATE_POSE_NOT_FINITE. Real-time safe.
   std::uint32_t step(const std::vector<palpate_pose>& poses) noexcept {
     return step(poses.data(), poses.size());
   }
 
-  /// What a tool feels since the last tick; all zero where there is no such tool. Real-time safe.
+  /// Returns the forces and pose of a tool since the last tick; all zero if there is no such tool. Real-time
+  /// safe.
   [[nodiscard]] palpate_result felt(int tool = 0) const noexcept {
     palpate_result result = PALPATE_RESULT_INIT;
     palpate_get(session_.get(), tool, &result);
     return result;
   }
 
-  /// Where a tool and the surface press on each other; none where there is no such tool. Allocates.
+  /// Returns the contacts between a tool and the surface; empty if there is no such tool. Allocates.
   [[nodiscard]] std::vector<palpate_contact> contacts(int tool = 0) const {
     std::vector<palpate_contact> found(static_cast<std::size_t>(felt(tool).contacts), PALPATE_CONTACT_INIT);
     int count = 0;
@@ -130,14 +131,14 @@ class Session {
     return found;
   }
 
-  /// What a tool is from the next tick on; false where it cannot become that. Real-time safe.
+  /// Changes a tool from the next tick on; false if the change is not allowed. Real-time safe.
   bool set_tool(int number, const palpate_tool& tool) noexcept {
     return palpate_set_tool(session_.get(), number, &tool) == 0;
   }
 
   void reset() noexcept { palpate_reset(session_.get()); }
 
-  /// Records each tick of a tool from now on, from the untouched body. Throws Error.
+  /// Starts recording each tick of a tool, from the untouched body. Throws Error.
   void record(const std::string& file, double pictures = 60.0, int tool = 0) {
     palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
     options.tool = tool;
@@ -174,7 +175,7 @@ class Session {
     return xyz;
   }
 
-  /// As options.stress_ticks has it found.
+  /// Returns stress and pressure as computed every options.stress_ticks.
   [[nodiscard]] SurfaceStress stress() {
     SurfaceStress found{-1, std::vector<float>(nodes()), std::vector<float>(nodes())};
     found.tick = palpate_surface_stress(session_.get(), found.von_mises.data(), found.pressure.data());
@@ -187,7 +188,7 @@ class Session {
     return all;
   }
 
-  /// For the functions of palpate.h.
+  /// Returns the session for the functions of palpate.h.
   [[nodiscard]] palpate_session* get() noexcept { return session_.get(); }
 
  private:
@@ -205,10 +206,10 @@ class Session {
   std::unique_ptr<palpate_session, End> session_;
 };
 
-/// A recording that is read back.
+/// Recording that is read back.
 class Recording {
  public:
-  /// Throws Error.
+  /// Opens a recording. Throws Error.
   explicit Recording(const std::string& file) {
     std::string error(4096, '\0');
     recording_.reset(palpate_recording_open(c_name(file), error.data(), error.size()));
@@ -221,14 +222,14 @@ class Recording {
     return all;
   }
 
-  /// Tick 0, 1, ...; all zero where there is none. Reads the file.
+  /// Returns tick 0, 1, ...; all zero if there is none. Reads the file.
   [[nodiscard]] palpate_recorded_tick tick(std::int64_t number) const noexcept {
     palpate_recorded_tick told = PALPATE_RECORDED_TICK_INIT;
     palpate_recording_tick(recording_.get(), number, &told);
     return told;
   }
 
-  /// Displacement of the surface nodes in picture 0, 1, ... [3 nodes] [m]. Throws Error.
+  /// Returns the displacement of the surface nodes in picture 0, 1, ... [3 nodes] [m]. Throws Error.
   [[nodiscard]] std::vector<float> picture(std::int64_t number) const {
     std::vector<float> xyz(3 * static_cast<std::size_t>(counts().nodes));
     check([&](char* error, std::size_t size) {
@@ -237,7 +238,7 @@ class Recording {
     return xyz;
   }
 
-  /// For the functions of palpate.h.
+  /// Returns the recording for the functions of palpate.h.
   [[nodiscard]] palpate_recording* get() noexcept { return recording_.get(); }
 
  private:

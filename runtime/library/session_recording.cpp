@@ -57,7 +57,7 @@ void SessionRecording::note(const ToolPose& wanted, Index centre, std::int64_t c
 }
 
 void SessionRecording::finish() {
-  frames_.reset();  // the last picture is in the recording
+  frames_.reset();  // waits until the last picture is in the recording
   recorder_.finish();
 }
 

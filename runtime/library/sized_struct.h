@@ -1,5 +1,5 @@
-// Structs of palpate.h given by programs that were compiled with an older or newer version of it. A member
-// that is added there goes to the end of its struct and must make it larger: padding has no size of its own.
+// Structs of palpate.h from programs compiled with an older or newer version of it. A new member must be
+// added at the end of its struct and must make it larger; padding does not count.
 #pragma once
 
 #include <algorithm>
@@ -9,17 +9,17 @@
 
 namespace palpate {
 
-constexpr std::size_t largest_struct = 4096;  // [bytes] whatever is larger was never set
+constexpr std::size_t largest_struct = 4096;  // [bytes] a larger size was never initialised
 
-/// Whether a version of `Struct` can have this size: its `size`, at least one member, and no member cut.
+/// True if a version of `Struct` can have this size: `size`, at least one more member, and no member cut.
 template <typename Struct>
 constexpr bool is_size_of(std::size_t size) noexcept {
   return size > sizeof(std::size_t) && size <= largest_struct && size % alignof(Struct) == 0;
 }
 
-/// Element `k` of an array whose first element tells the size of them all. Members that it lacks are those of
-/// `defaults`. Nothing where it is null, the size cannot be, is another than the first one's, or a member
-/// that is not known here is set (the rule of Linux's copy_struct_from_user).
+/// Reads element `k` of an array whose first element gives the size of all. Members that it lacks are taken
+/// from `defaults`. Empty if the pointer is null, the size is invalid or differs from the first one's, or a
+/// member unknown to this version is set (the rule of Linux's copy_struct_from_user).
 template <typename Struct>
 std::optional<Struct> read_struct(const Struct* first, std::size_t k, const Struct& defaults) noexcept {
   if (first == nullptr) return std::nullopt;
@@ -35,9 +35,9 @@ std::optional<Struct> read_struct(const Struct* first, std::size_t k, const Stru
   return result;
 }
 
-/// Gives the caller the members that its struct has, element `k` of an array whose first element tells the
-/// size of them all; those that are not known here become 0. False, with nothing written, where it is null or
-/// its size cannot be.
+/// Writes the members that the caller's struct has, element `k` of an array whose first element gives the
+/// size of all; members unknown to this version become 0. False, and nothing is written, if the pointer is
+/// null or the size is invalid.
 template <typename Struct>
 bool write_struct(Struct from, Struct* first, std::size_t k = 0) noexcept {
   if (first == nullptr) return false;

@@ -1,12 +1,12 @@
-/* Palpate in somebody else's loop: lowers a sphere of 5 mm onto the body, presses it 3 mm deep and rubs it to
- * and fro along x by 3 mm, a thousand times a second for two seconds. Usage: own_loop NAME.palpate.hdf */
+/* Palpate in your own loop: lowers a sphere of 5 mm onto the body, presses it 3 mm deep and rubs it back and
+ * forth along x by 3 mm, for two seconds at 1 kHz. Usage: own_loop NAME.palpate.hdf */
 #define _POSIX_C_SOURCE 200809L
 #include <palpate.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
-/* Half a millimetre above the surface's highest node, over the middle of its nodes. */
+/* Starts half a millimetre above the surface's highest node, over the centre of its nodes. */
 static void place_above(const palpate_session* session, double radius, double position[3]) {
   palpate_counts counts = PALPATE_COUNTS_INIT;
   palpate_surface_counts(session, &counts);
@@ -24,7 +24,7 @@ static void place_above(const palpate_session* session, double radius, double po
   free(xyz);
 }
 
-/* Yours would leave that to another thread. */
+/* Your loop would leave printing to another thread. */
 static void print(int tick, const palpate_pose* pose, const palpate_result* felt, uint32_t status) {
   const double *x = pose->position, *f = felt->force;
   printf("%4d ms  at %.4f %.4f %.4f m  force %10.4g %10.4g %10.4g N  stiffness along z %10.4g N/m", tick,
@@ -38,12 +38,12 @@ int main(int argc, char** argv) {
   char error[512] = "usage: own_loop NAME.palpate.hdf\n";
   palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = 0.005;
-  tool.coupling_stiffness = 2000.0; /* what the device can show */
+  tool.coupling_stiffness = 2000.0; /* limit of the device */
   tool.max_force = 5.0;
   palpate_session* session = argc == 2 ? palpate_create(argv[1], &tool, 1, 32, error, sizeof error) : NULL;
   if (session == NULL) return fputs(error, stderr), 1;
 
-  palpate_pose pose = PALPATE_POSE_INIT; /* yours comes from the device */
+  palpate_pose pose = PALPATE_POSE_INIT; /* read it from your device */
   place_above(session, tool.radius, pose.position);
   double pressed = 0.0, rubbed = 0.0, stride = 0.00002; /* 20 mm/s */
   struct timespec due;
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
 
     palpate_result felt = PALPATE_RESULT_INIT;
     const uint32_t status = palpate_step(session, &pose);
-    palpate_get(session, 0, &felt); /* yours sends felt.force to the device */
+    palpate_get(session, 0, &felt); /* send felt.force to your device */
     if (tick % 200 == 0) print(tick, &pose, &felt, status);
 
     if (pressed < 0.003) pose.position[2] -= 0.00005;
