@@ -1,4 +1,4 @@
-// Ticks whose force is a best effort, and by how much.
+// Ticks whose force is a best effort, and the size of its error.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +9,13 @@
 
 namespace palpate {
 
-/// Counts positive numbers in classes 40 a decade wide from 1e-15 to 1e9: medians to 6 %. Fixed memory.
+/// Counts positive numbers from 1e-15 to 1e9 in 40 classes per decade, for medians accurate to 6 %. Fixed
+/// memory.
 class DecadeHistogram {
  public:
   void add(double value) noexcept;
   void add(const DecadeHistogram& other) noexcept;
-  /// About the middle one, at the upper end of its class; 0 when empty.
+  /// Median, at the upper end of its class; 0 if empty.
   [[nodiscard]] double median() const noexcept;
 
  private:
@@ -25,35 +26,35 @@ class DecadeHistogram {
   std::int64_t total_ = 0;
 };
 
-/// Whether the force of a tick is a best effort: the solver was cut short, contact points that the tool
-/// presses on found no room, or a body that gives way with time stood still.
+/// True if the force of a tick is a best effort: the solver was stopped early, contact points pressed by the
+/// tool exceeded the capacity, or a time-dependent body was not stepped.
 [[nodiscard]] constexpr bool is_best_effort(StepStatus status, std::int64_t left_out,
                                             double force_error) noexcept {
   return has(status, StepStatus::not_converged) || left_out > 0 || force_error > 0.0;
 }
 
-/// What is known of such ticks of a run.
+/// Statistics of the best-effort ticks of a run.
 struct BestEffort {
-  /// Takes in a tick, which is one or not: the force that is felt and how far it may be off [N].
+  /// Adds a tick of any kind: the force on the hand and its possible error [N].
   void add(StepStatus status, double force, double force_error, std::int64_t left_out, double time) noexcept;
 
-  /// Takes in those of a run that began `time_before` [s] after this one.
+  /// Adds the statistics of a later run, which began `time_before` [s] after this one.
   void add(const BestEffort& later, double time_before) noexcept;
 
   [[nodiscard]] double median_error() const noexcept { return std::min(errors.median(), largest_error); }
   [[nodiscard]] double median_share() const noexcept { return std::min(shares.median(), largest_share); }
 
   std::int64_t ticks = 0;
-  std::int64_t not_converged_ticks = 0;  ///< of them
-  std::int64_t left_out_ticks = 0;       ///< of them
-  std::int64_t late_ticks = 0;           ///< of them, the body stood still
-  double largest_late_error = 0.0;       ///< in these [N]
-  std::int64_t most_left_out = 0;        ///< contact points in one tick
+  std::int64_t not_converged_ticks = 0;  ///< of these ticks
+  std::int64_t left_out_ticks = 0;       ///< of these ticks
+  std::int64_t late_ticks = 0;           ///< of these ticks; the body was not stepped
+  double largest_late_error = 0.0;       ///< in the late ticks [N]
+  std::int64_t most_left_out = 0;        ///< most contact points left out of one tick
   double largest_error = 0.0;            ///< [N]
   double largest_error_time = 0.0;       ///< [s]
-  double largest_share = 0.0;            ///< of error in force, 1 where it is more
+  double largest_share = 0.0;            ///< error / force, at most 1
   DecadeHistogram errors;                ///< [N]
-  DecadeHistogram shares;                ///< of error in force
+  DecadeHistogram shares;                ///< error / force
 };
 
 }  // namespace palpate

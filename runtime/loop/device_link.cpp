@@ -13,8 +13,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t patience = 2'000'000;            // ns that a command may be old
-constexpr std::int64_t wait = 1'000'000;                // ns, for a new command
+constexpr std::int64_t patience = 2'000'000;            // ns; maximum age of a command
+constexpr std::int64_t wait = 1'000'000;                // ns; waiting time for a new command
 constexpr auto retry = std::chrono::milliseconds(100);  // between attempts to open a lost device
 
 }  // namespace
@@ -31,7 +31,7 @@ DeviceLink::DeviceLink(std::unique_ptr<DevicePort> port, const DeviceLinkOptions
   options_.max_force = std::min(options_.max_force, port_->limits().max_force);
   name_ = port_->name();
   sem_init(&is_shown_, 0, 0);
-  // A wait on the wire that a signal interrupts would be taken for a lost device.
+  // A signal that interrupts a wait for the device would look like a lost device.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);
@@ -71,7 +71,7 @@ void DeviceLink::display(const DeviceCommand& command, const DeviceState& state,
 void DeviceLink::read_reports() noexcept {
   ask_for_priority(wire_priority);
   bool is_open = true;   // as this thread left it
-  bool is_back = false;  // but has not said anything yet
+  bool is_back = false;  // open again, but no report yet
   while (!stop_) {
     if (!is_open) {
       std::this_thread::sleep_for(retry);
@@ -139,7 +139,7 @@ void DeviceLink::write_commands() noexcept {
       ++extrapolated_;
     } else {
       stale_.reset();
-      constexpr double at_once = 1e9;  // safety has bounded its rate already
+      constexpr double at_once = 1e9;  // the safety layer has already limited the rate
       rate_.follow(shown.command.wrench.force, at_once);
       write(shown.command, shown.state);
     }
@@ -152,7 +152,7 @@ DeviceCommand DeviceLink::extrapolate(const Shown& shown, const DeviceState& sta
                                       double elapsed) noexcept {
   Vec3 field = stale_.force(shown.command, state.pose.position, state.velocity,
                             seconds_between(shown.begun, now), elapsed);
-  if (shown.command.wrench.force.isZero(0.0)) field.setZero();  // nor damping, where nothing was to be felt
+  if (shown.command.wrench.force.isZero(0.0)) field.setZero();  // no damping either without a force to feel
   DeviceCommand command;
   command.wrench.force = rate_.follow(clamped(stale_.share() * field, options_.max_force), elapsed);
   command.wrench.torque = stale_.share() * shown.command.wrench.torque;

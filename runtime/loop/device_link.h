@@ -1,4 +1,4 @@
-// Joins the loop to a device by two threads, so that the loop never waits for the wire.
+// Connects the loop to a device through two threads, so that the loop never waits for the device.
 #pragma once
 
 #include <semaphore.h>
@@ -18,46 +18,46 @@
 namespace palpate {
 
 struct DeviceLinkOptions {
-  /// The largest force that the writer works out itself, where the device bears it [N].
+  /// Largest force computed by the writer itself, if the device allows it [N].
   double max_force = SafetyOptions{}.max_force;
   double max_force_rate = SafetyOptions{}.max_force_rate;  ///< [N/s]
-  StaleOptions stale{};  ///< of the loop's solutions, when it gives no new ones
+  StaleOptions stale{};  ///< lifetime and damping of the loop's solutions, when no new one arrives
 };
 
-/// A device with a reader and a writer thread. The reader hands over the latest report, and opens the device
-/// again when it was lost and is back. The writer writes what the loop shows as soon as it is there. When
-/// that is older than 2 ms (the loop may hang), the writer goes on by itself: the last solution as a
-/// field, force - K (x - point) - b v at where the device is now, within its radius and time to live, then it
-/// fades; it never holds a force. Both threads ask for real-time scheduling, a little below the loop's.
+/// Device with a reader and a writer thread. The reader passes on the latest report, and reopens a lost
+/// device once it is back. The writer sends each command of the loop as soon as it is available. If the last
+/// command is older than 2 ms (the loop may hang), the writer continues alone: the last solution as a force
+/// field, force - K (x - point) - b v at the device's current position, within its radius and time to live,
+/// then it fades; it never holds a force. Both threads request real-time scheduling, just below the loop's.
 class DeviceLink : public Device {
  public:
-  /// Opens the device. Throws Error that says why it cannot be.
+  /// Opens the device. Throws Error with the reason if that fails.
   DeviceLink(std::unique_ptr<DevicePort> port, const DeviceLinkOptions& options);
-  /// No force, then closes.
+  /// Sets the force to zero, then closes.
   ~DeviceLink() override;
   DeviceLink(const DeviceLink&) = delete;
   DeviceLink& operator=(const DeviceLink&) = delete;
 
-  /// Whether the device has said anything yet.
+  /// True once the device has sent a report.
   [[nodiscard]] bool has_reported() const noexcept { return reports_ > 0; }
-  [[nodiscard]] const std::string& name() const noexcept { return name_; }  ///< when it was opened first
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }  ///< name at the first opening
   [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
   [[nodiscard]] std::string refusals() const { return port_->refusals(); }
 
   DeviceNews poll(const TickTime& tick) noexcept override;
   void display(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override;
 
-  [[nodiscard]] std::int64_t reports() const noexcept { return reports_; }            ///< heard so far
-  [[nodiscard]] std::int64_t writes() const noexcept { return writes_; }              ///< done so far
+  [[nodiscard]] std::int64_t reports() const noexcept { return reports_; }            ///< reports so far
+  [[nodiscard]] std::int64_t writes() const noexcept { return writes_; }              ///< writes so far
   [[nodiscard]] std::int64_t worst_write() const noexcept { return worst_write_; }    ///< [ns]
-  [[nodiscard]] std::int64_t extrapolated() const noexcept { return extrapolated_; }  ///< of the writes
+  [[nodiscard]] std::int64_t extrapolated() const noexcept { return extrapolated_; }  ///< of these writes
 
  private:
-  /// What the loop shows, and of what it follows.
+  /// Command of the loop and the state that it was computed from.
   struct Shown {
     DeviceCommand command;
     DeviceState state;
-    std::int64_t begun = 0;  // the tick [ns]
+    std::int64_t begun = 0;  // start of the tick [ns]
   };
 
   void read_reports() noexcept;
@@ -77,8 +77,8 @@ class DeviceLink : public Device {
   Latest<DeviceState> heard_by_writer_;
   std::atomic<std::int64_t> reports_ = 0;
   std::atomic<std::int64_t> losses_ = 0;
-  std::atomic<std::int64_t> openings_ = 1;  // that a report followed
-  // The loop's own.
+  std::atomic<std::int64_t> openings_ = 1;  // openings that were followed by a report
+  // Used by the loop alone.
   std::int64_t losses_told_ = 0;
   std::int64_t openings_told_ = 1;
 
@@ -88,12 +88,12 @@ class DeviceLink : public Device {
   std::atomic<std::int64_t> writes_ = 0;
   std::atomic<std::int64_t> worst_write_ = 0;
   std::atomic<std::int64_t> extrapolated_ = 0;
-  StaleSolution stale_;  // the writer's
-  RateClamp rate_;       // too
+  StaleSolution stale_;  // used by the writer
+  RateClamp rate_;       // used by the writer
 
-  std::mutex wire_;                   // the writer writes, or the reader closes and opens
-  bool is_open_ = true;               // under wire_
-  std::atomic<bool> broken_ = false;  // the writer could not write
+  std::mutex wire_;                   // held while the writer writes, or the reader closes and opens
+  bool is_open_ = true;               // guarded by wire_
+  std::atomic<bool> broken_ = false;  // a write failed
   std::atomic<bool> stop_ = false;
   std::thread reader_;
   std::thread writer_;

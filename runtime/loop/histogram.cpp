@@ -19,7 +19,7 @@ std::int64_t step_of(std::int64_t duration) noexcept {
   return octave_steps * octave + (duration >> octave);
 }
 
-/// The longest duration that it counts [ns].
+/// Longest duration counted in a step [ns].
 std::int64_t last_of(std::int64_t step) noexcept {
   if (step < octave_steps) return step;
   const std::int64_t octave = step / octave_steps - 1;

@@ -1,4 +1,4 @@
-// Percentiles of durations without keeping them all.
+// Percentiles of durations in fixed memory.
 #pragma once
 
 #include <cstdint>
@@ -6,28 +6,28 @@
 
 namespace palpate {
 
-/// Counts durations in steps of 1 ns below 1 us and of at most 1/500 of them from there up to 1 s; longer
-/// ones only as "longer". Between 500 ns and 500 ns times a power of 2 there are whole steps. Fixed memory of
-/// 88 kB, taken at construction.
+/// Counts durations up to 1 s in steps of 1 ns below 1 us, and of at most 1/500 of the duration above; longer
+/// ones only as "longer". The boundaries 500 ns times a power of 2 are exact. Fixed memory of 88 kB,
+/// allocated at construction.
 class TimeHistogram {
  public:
   TimeHistogram();
 
-  void add(std::int64_t nanoseconds) noexcept;  ///< negative ones count as 0
+  void add(std::int64_t nanoseconds) noexcept;  ///< a negative duration counts as 0
   void add(const TimeHistogram& other) noexcept;
   void clear() noexcept;
 
-  /// The smallest duration [ns] that at least the fraction 0..1 of all does not exceed, rounded up to the
-  /// step (the worst when it is over 1 s); 0 when empty.
+  /// Smallest duration [ns] not exceeded by at least the fraction 0..1 of all, rounded up to its step (the
+  /// worst one if it is over 1 s); 0 if empty.
   [[nodiscard]] std::int64_t percentile(double fraction) const noexcept;
 
-  /// How many lie in [from, to) [ns], by steps.
+  /// Number of durations in [from, to) [ns], at the resolution of the steps.
   [[nodiscard]] std::int64_t total_between(std::int64_t from, std::int64_t to) const noexcept;
   [[nodiscard]] std::int64_t total() const noexcept { return total_; }
   [[nodiscard]] std::int64_t worst() const noexcept { return worst_; }  ///< [ns]
 
  private:
-  std::vector<std::int64_t> counts_;  // by steps
+  std::vector<std::int64_t> counts_;  // per step
   std::int64_t longer_ = 0;
   std::int64_t total_ = 0;
   std::int64_t worst_ = 0;

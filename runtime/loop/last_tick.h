@@ -1,4 +1,4 @@
-// What the last tick of a run left behind, as files.
+// Export of the state after the last tick of a run.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,11 @@
 
 namespace palpate {
 
-/// The contact points as CSV: place, outward normal, force on the body, gap, simplex, held by a grab.
+/// Returns the contact points as CSV: position, outward normal, force on the body, gap, simplex, held by a
+/// grab.
 std::string contact_table(const Body& body, const State& state);
 
-/// Writes the surface, undeformed, with u0 + u, which is what is seen, von Mises stress and contact pressure
+/// Writes the undeformed surface with its visible displacement u0 + u, von Mises stress and contact pressure
 /// (.vtu). Throws Error.
 void write_surface(const std::filesystem::path& file, const Body& body, const State& state);
 

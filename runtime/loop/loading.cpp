@@ -24,7 +24,7 @@
 namespace palpate {
 namespace {
 
-/// A page loads the body again where its settings change.
+/// Prints a warning once, although a page reloads the body when its settings change.
 void warn_once(const std::string& text) {
   static std::mutex mutex;
   static std::set<std::string> told;
@@ -46,7 +46,7 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
-/// What a warped body is not.
+/// Refuses settings that a warped body does not support.
 void check_warp(const BodyOptions& options) {
   const auto refuse = [](const char* why, const char* option) {
     throw Error(why, option, std::string("leave out ") + option + " or --warp");
@@ -57,7 +57,7 @@ void check_warp(const BodyOptions& options) {
   if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
 }
 
-/// Leaves out what a body whose overlays are neo-Hookean has no place for.
+/// Checks that a model fits neo-Hookean overlays, and drops the data that they do not use.
 void prepare_for_law(Model& model, const BodyOptions& options) {
   if (options.refinement == 1) {
     throw Error("the law is that of overlays, and there is none", "--overlay-law",

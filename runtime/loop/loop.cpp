@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int64_t second = 1'000'000'000;  // ns
 
-/// Returns early when a signal comes.
+/// Returns early on a signal.
 void sleep_until(std::int64_t due) noexcept {
   const timespec time{.tv_sec = due / second, .tv_nsec = due % second};
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
@@ -27,13 +27,13 @@ void note_largest(double value, double time, double& largest, double& largest_ti
   largest_time = time;
 }
 
-/// What the device, the safety rules and a person make of a tick.
+/// Implements run_loop.
 class Loop {
  public:
   Loop(const LoopParts& parts, const LoopOptions& options)
       : parts_(parts), options_(options), start_(options.fast ? 0 : monotonic_now() + second / options.rate) {
     report_.rate = options.rate;
-    if (parts.safety != nullptr) fault_ = parts.safety->fault();  // counted when it came
+    if (parts.safety != nullptr) fault_ = parts.safety->fault();  // counted when it occurred
   }
 
   LoopReport run(const std::atomic<bool>& stop) {
@@ -67,8 +67,8 @@ class Loop {
     return parts_.control != nullptr && parts_.control->paused;
   }
 
-  /// Until the pause ends, or a single tick is asked for. The loop's start is moved by as much, so that the
-  /// clock of its ticks stands still.
+  /// Waits until the pause ends or a single tick is requested. Shifts the loop's start by the waiting time,
+  /// so that the clock of the ticks stands still.
   void wait_paused(const std::atomic<bool>& stop) noexcept {
     LoopControl& control = *parts_.control;
     if (!was_paused_) show_picture();
@@ -105,7 +105,7 @@ class Loop {
     in_body_ = parts_.workspace.in_body(news_.state);
     const Vec3 force_before = tool().wrench.force;
 
-    if (options_.fast) serve();  // they do what is missing, untimed
+    if (options_.fast) serve();  // the threads compute missing results, untimed
     const std::int64_t begin = monotonic_now();
     if (!options_.fast) serve();
     step(parts_.body, parts_.state, in_body_.pose);
@@ -123,7 +123,7 @@ class Loop {
     if (is_paused() || tick_.number % options_.ticks_per_view == 0) show_picture();
   }
 
-  /// What was said beside the device. A replay has it from its session.
+  /// Reads events that come from outside the device. A replay takes them from its session.
   void poll_person() noexcept {
     const bool resumes = std::exchange(was_paused_, is_paused());
     if (parts_.replayed != nullptr) return;
@@ -133,8 +133,8 @@ class Loop {
     if (resumes) news_.events |= DeviceEvent::resumed;
   }
 
-  /// A tool that is lifted meets nothing: each tick puts it where the pointer is, and it is felt there only
-  /// once it is clear of the body. Where it is let down it need not be quite clear.
+  /// Moves a lifted tool directly to the pointer in each tick, without contact. It is felt there only once it
+  /// is clear of the body; where it is lowered it need not be quite clear.
   void lift() noexcept {
     ToolState& lifted = parts_.state.tools.front();
     const bool is_lifted = has(news_.events, DeviceEvent::lifted);
@@ -147,7 +147,7 @@ class Loop {
     is_lifted_ = is_lifted;
   }
 
-  /// The overlay and the free motion of this tick.
+  /// Takes the overlay and the free motion of this tick.
   void serve() noexcept {
     const TickRecord* then = nullptr;
     if (parts_.replayed != nullptr) then = &parts_.replayed->then();
@@ -169,8 +169,8 @@ class Loop {
     }
   }
 
-  /// From what was computed to what the hand is shown. Times are given from the loop's start on, so that a
-  /// replay has the same numbers.
+  /// Passes the computed force through the safety layer to the device. Times count from the loop's start, so
+  /// that a replay has the same numbers.
   void guard() noexcept {
     const DeviceCommand computed = parts_.workspace.in_device({tool().wrench, tool().local});
     if (parts_.safety == nullptr) {
@@ -195,7 +195,7 @@ class Loop {
     if (has(news_.events, DeviceEvent::lost)) safety.fail(Fault::device_lost);
     if (has(news_.events, DeviceEvent::input_lost)) safety.fail(Fault::input_lost);
     if (has(news_.events, DeviceEvent::opened_again)) {
-      // Who plugs it in again has seen that it was gone.
+      // A person who plugs it in again has noticed the loss.
       ++report_.opened_again;
       const bool was_gone = safety.fault() == Fault::device_lost || safety.fault() == Fault::device_silent;
       if (was_gone) safety.acknowledge();
@@ -234,7 +234,7 @@ class Loop {
     report_.best_effort.add(state.status, force.stableNorm(), tool().force_error, tool().left_out, time());
   }
 
-  /// The recording and the monitor.
+  /// Reports the tick to recorder and monitor.
   void tell() noexcept {
     if (parts_.monitor != nullptr || parts_.feed != nullptr) {
       const TickNote note = {.number = tick_.number,
@@ -265,12 +265,13 @@ class Loop {
     }
   }
 
-  /// How far the closed contacts press the surface in from where it would be without the tool, at most [m].
+  /// Largest depth to which closed contacts press the surface in, relative to the surface without the tool
+  /// [m].
   [[nodiscard]] double depth() const noexcept {
     double deepest = 0.0;
     for (const ContactPoint& contact : parts_.state.contacts()) {
       if (contact.force.squaredNorm() == 0.0) continue;
-      Vec3 moved = Vec3::Zero();  // inward
+      Vec3 moved = Vec3::Zero();  // displacement inward
       for_each_node(parts_.body, parts_.state.surface.near, contact, [&](Index node, double weight) {
         const Vec3 untouched = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)] +
                                parts_.state.surface.motion.untouched(parts_.body, node);
@@ -316,16 +317,16 @@ class Loop {
   LoopParts parts_;
   LoopOptions options_;
   LoopReport report_;
-  std::int64_t start_;  // when tick 0 is due [ns]
+  std::int64_t start_;  // time at which tick 0 is due [ns]
   TickTime tick_;
   DeviceNews news_;
-  DeviceState in_body_;  // what was said, in the body's frame
+  DeviceState in_body_;  // last state in the body's frame
   DeviceCommand shown_;
   std::int64_t compute_ns_ = 0;
   Fault fault_ = Fault::none;
   bool was_paused_ = false;
-  bool is_lifted_ = false;   // in the tick before
-  double shown_time_ = 0.0;  // of the last tick [s]
+  bool is_lifted_ = false;   // in the previous tick
+  double shown_time_ = 0.0;  // time of the last tick [s]
 };
 
 }  // namespace

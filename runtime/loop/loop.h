@@ -1,4 +1,4 @@
-// The loop: device, step, safety, device.
+// Haptic loop: read device, step, safety, display.
 #pragma once
 
 #include <atomic>
@@ -19,44 +19,43 @@
 
 namespace palpate {
 
-/// What a person may ask of a loop that runs, from any thread.
+/// Requests to a running loop, from any thread.
 struct LoopControl {
-  /// Takes no ticks, and shows the device no force: it goes on as if no time had passed, but that force
-  /// begins anew.
+  /// Stops ticking and displays no force. After the pause the loop continues as if no time had passed, except
+  /// that the force starts again from zero.
   std::atomic<bool> paused = false;
-  std::atomic<std::int64_t> single_ticks = 0;  ///< to take while paused; nothing is shown of them
-  std::atomic<bool> acknowledged = false;      ///< the fault was seen
+  std::atomic<std::int64_t> single_ticks = 0;  ///< ticks to take while paused, without force
+  std::atomic<bool> acknowledged = false;      ///< a person has acknowledged the fault
   std::atomic<bool> leave = false;             ///< ends the run
 };
 
-/// What a loop is made of. The pointers may be null.
+/// Parts of a loop. The pointers may be null.
 struct LoopParts {
   const Body& body;
-  State& state;  ///< with one tool, and ticks of the loop's rate
+  State& state;  ///< with one tool, and a time step that fits the loop's rate
   Device& device;
   Workspace workspace{};
-  Safety* safety = nullptr;  ///< null: nobody feels it, the device is shown what was computed
+  Safety* safety = nullptr;  ///< null: no person feels the force; the computed force is displayed
   PatchSource* overlays = nullptr;
   MotionSource* motion = nullptr;
   Recorder* recorder = nullptr;
   Monitor* monitor = nullptr;
   SurfaceFrames* frames = nullptr;
   LoopControl* control = nullptr;
-  TickFeed* feed = nullptr;                ///< of a viewer
-  SurfaceFrames* viewed = nullptr;         ///< and its pictures, of each tick that it is given
-  const ReplayDevice* replayed = nullptr;  ///< the device, where overlays and motion come as they came then
+  TickFeed* feed = nullptr;                ///< feed of a viewer
+  SurfaceFrames* viewed = nullptr;         ///< pictures for the viewer
+  const ReplayDevice* replayed = nullptr;  ///< the device, if overlays and motion are replayed too
 };
 
 struct LoopOptions {
-  std::int64_t rate = default_rate;  ///< ticks a second
-  std::int64_t ticks = 0;            ///< to take
+  std::int64_t rate = default_rate;  ///< ticks per second
+  std::int64_t ticks = 0;            ///< number of ticks to take
   bool fast = false;                 ///< do not wait: each tick begins when it is due
-  std::int64_t ticks_per_view = 16;  ///< from one picture for `viewed` to the next
+  std::int64_t ticks_per_view = 16;  ///< ticks between two pictures for `viewed`
 };
 
-/// Steps at the rate of the options, or as fast as it goes without waiting (`fast`: deterministic). Ends
-/// early when `stop` becomes true, the control says `leave` or what is replayed failed; the device is shown
-/// no force then.
+/// Runs the loop at the rate of the options, or without waiting (`fast`, deterministic). Ends early if `stop`
+/// becomes true, the control requests `leave`, or the replay fails; the device is then shown no force.
 LoopReport run_loop(const LoopParts& parts, const LoopOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace palpate

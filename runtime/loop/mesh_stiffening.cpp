@@ -5,7 +5,7 @@
 namespace palpate {
 namespace {
 
-/// C of the law; of nu = 0.3 and 0.45 the mean, which are within 5 % of it.
+/// Constant C of the law: mean of the values for nu = 0.3 and 0.45, which are within 5 % of it.
 double factor_of(ElementType element) noexcept {
   switch (element) {
     case ElementType::tet4:
@@ -18,7 +18,7 @@ double factor_of(ElementType element) noexcept {
     case ElementType::tri3:
     case ElementType::tri6:
     case ElementType::quad4:
-      break;  // in the plane, or no body's
+      break;  // in the plane, or not used by bodies
   }
   return 0.0;
 }

@@ -1,4 +1,4 @@
-// What a mesh adds to the force of a small tool.
+// Stiffening of a small tool's contact by the mesh.
 #pragma once
 
 #include "runtime/body/body.h"
@@ -6,14 +6,14 @@
 
 namespace palpate {
 
-inline constexpr double noticed_stiffening = 1.2;  ///< above it a person is told
+inline constexpr double noticed_stiffening = 1.2;  ///< a larger one is reported
 
-/// Force of a press on the body's mesh over that on a smooth body, where `tool` presses the surface in by
-/// `depth` [m]: sqrt(1 + (C h / a)^2), with a = sqrt(R depth) the radius of the contact (of a flat disc its
-/// own), h the mean edge of the surface and C by kind of element. A touch of one node is linear, F = k delta,
-/// and Hertz's is 4/3 E* sqrt(R) delta^1.5: their ratio goes with h / a. Between the two the law was measured
-/// on blocks, and fits to 7 % (docs/measurements/accuracy.md). 1 for what has no such radius (a point, a tool
-/// that pulls) and in the plane, where nothing was measured.
+/// Ratio of a press's force on the body's mesh to that on a smooth body, for `tool` pressing the surface in
+/// by `depth` [m]: sqrt(1 + (C h / a)^2), with a = sqrt(R depth) the contact radius (for a flat disc its
+/// own), h the mean edge of the surface and C per kind of element. A press on a single node is linear, F = k
+/// delta, and Hertz's is 4/3 E* sqrt(R) delta^1.5: their ratio scales with h / a. Between the two the law was
+/// measured on blocks and fits to 7 % (docs/measurements/accuracy.md). Returns 1 without such a radius (a
+/// point, a tool that pulls) and in the plane, where it was not measured.
 [[nodiscard]] double mesh_stiffening(const Body& body, const Tool& tool, double depth) noexcept;
 
 }  // namespace palpate

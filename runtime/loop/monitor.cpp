@@ -19,7 +19,7 @@ namespace {
 
 constexpr auto pause = std::chrono::milliseconds(20);
 constexpr int pauses_a_line = 25;         // half a second
-constexpr std::size_t most_notes = 8192;  // ticks that may wait: more than a second of the fastest loop
+constexpr std::size_t most_notes = 8192;  // queued ticks: more than a second of the fastest loop
 
 double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
@@ -32,9 +32,9 @@ sigset_t acknowledging_signal() {
   return signals;
 }
 
-/// Who reads from its terminal in the background is stopped.
+/// True if reading cannot stop this process, as it does in the background of a terminal.
 bool may_read_input() {
-  const pid_t foreground = tcgetpgrp(STDIN_FILENO);  // below 0: it is not our terminal
+  const pid_t foreground = tcgetpgrp(STDIN_FILENO);  // below 0: not our terminal
   return foreground < 0 || foreground == getpgrp();
 }
 
@@ -135,12 +135,12 @@ void Monitor::ask() {
   if (!asks_ || poll(&input, 1, 0) <= 0) return;
   char text[256];
   const ssize_t got = read(STDIN_FILENO, text, sizeof text);
-  asks_ = got > 0;  // at its end there is nobody any more
+  asks_ = got > 0;  // at the end of the input no more answers come
   if (got > 0 && std::string_view(text, static_cast<std::size_t>(got)).find('\n') != std::string_view::npos)
     acknowledged_ = true;
 }
 
-/// A line of its own, above the one that is renewed.
+/// Prints a line of its own, above the one that is renewed.
 void Monitor::say(const std::string& text) {
   if (drawn_) std::fputs("\r\x1b[K", stderr);
   palpate::say(stderr, "{}\n", text);

@@ -1,4 +1,4 @@
-// Numbers that people write, read the same in every locale.
+// Parsing of numbers, independent of the locale.
 #pragma once
 
 #include <optional>
@@ -9,16 +9,16 @@
 
 namespace palpate {
 
-/// A finite number and nothing else but spaces round it, or nothing.
+/// Parses a finite number, with nothing else except spaces around it; otherwise empty.
 std::optional<double> parse_number(std::string_view text);
 
-/// "x,y" or "x,y,z": two or three finite numbers, or nothing.
+/// Parses "x,y" or "x,y,z": two or three finite numbers; otherwise empty.
 std::optional<std::vector<double>> parse_vector(std::string_view text);
 
-/// A whole number from 0 on, or nothing.
+/// Parses a whole number from 0; otherwise empty.
 std::optional<Index> parse_index(std::string_view text);
 
-/// The parts of `text` between commas, without spaces round them.
+/// Returns the parts of `text` between commas, without surrounding spaces.
 std::vector<std::string_view> split_commas(std::string_view text);
 
 }  // namespace palpate

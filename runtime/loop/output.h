@@ -1,4 +1,4 @@
-// What the program prints and writes.
+// Text output of the program.
 #pragma once
 
 #include <exception>
@@ -9,13 +9,13 @@
 
 namespace palpate {
 
-/// `error` itself where it is an Error, else what it says without a place and a hint.
+/// Returns `error` itself if it is an Error, otherwise an Error with its text and without place and hint.
 Error as_error(const std::exception& error);
 
-/// `WHERE: WHAT (HINT)`, without the parts that are empty.
+/// Formats `WHERE: WHAT (HINT)`, without the parts that are empty.
 std::string in_one_line(const Error& error);
 
-/// `warning: TEXT` on the error stream, in one piece and over a line that is being renewed there.
+/// Prints `warning: TEXT` to the error stream, in one write, over a line that is being renewed there.
 void print_warning(std::string_view text);
 
 }  // namespace palpate

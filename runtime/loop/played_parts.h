@@ -1,4 +1,4 @@
-// All of a run that was begun anew.
+// Sessions of a run that was restarted.
 #pragma once
 
 #include <cstdint>
@@ -11,30 +11,30 @@
 
 namespace palpate {
 
-/// The sessions of a run, one after the other: each reset, change of settings and recording begins one.
+/// Sessions of a run, in order: each reset, change of settings and recording begins a new one.
 class PlayedParts {
  public:
-  /// What a session was.
+  /// Description of a session.
   struct Part {
-    std::string because;  ///< it began: "start", "reset", "settings", "recording begun", "recording ended"
+    std::string because;  ///< reason: "start", "reset", "settings", "recording begun" or "recording ended"
     SettingsText settings;
-    std::filesystem::path recording;  ///< empty: none
-    std::int64_t dropped = 0;         ///< ticks that the recording lacks
+    std::filesystem::path recording;  ///< empty if there is none
+    std::int64_t dropped = 0;         ///< ticks missing from the recording
   };
 
   void add(const Part& part, const LoopReport& report);
 
-  /// All of them together; times are those of the run, without what lies between its sessions.
+  /// Sum of all sessions; times are those of the run, without the gaps between sessions.
   [[nodiscard]] const LoopReport& report() const noexcept { return report_; }
   [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
   struct Row {
     Part part;
-    double begun = 0.0;  ///< [s]
+    double begun = 0.0;  ///< start [s]
     std::int64_t sessions = 0;
     std::int64_t ticks = 0, ticks_in_contact = 0, misses = 0, faults = 0;
     double largest_force = 0.0, largest_shown = 0.0;  ///< [N]
   };
-  /// One for each session. From 10 000 on the last one is of all further ones together.
+  /// One row per session. From 10 000 on, the last row sums up all further ones.
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
 
  private:

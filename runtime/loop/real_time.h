@@ -1,4 +1,4 @@
-// What the operating system can do for a loop that must not be late.
+// Real-time rights of a loop, granted by the operating system.
 #pragma once
 
 #include <optional>
@@ -6,15 +6,15 @@
 
 namespace palpate {
 
-/// Priorities under SCHED_FIFO: above audio servers, below the kernel's own threads.
+/// Priorities under SCHED_FIFO: above audio servers, below kernel threads.
 constexpr int loop_priority = 80;
-constexpr int wire_priority = 79;  ///< of the threads that read and write a device
+constexpr int wire_priority = 79;  ///< for the threads that read and write a device
 
-/// Asks for SCHED_FIFO for the calling thread; false, with errno, when it is refused.
+/// Requests SCHED_FIFO for the calling thread; false, with errno, if it is refused.
 bool ask_for_priority(int priority) noexcept;
 
-/// Asks for real-time scheduling of the calling thread, for locked memory and, if one is named, for a
-/// processor to run on alone with nobody else of this process, until destroyed. None is needed to run.
+/// Requests real-time scheduling of the calling thread, locked memory and, if a processor is named, that
+/// processor without other threads of this process, until destroyed. None of these is required.
 class RealTimeRights {
  public:
   explicit RealTimeRights(std::optional<int> processor = std::nullopt);
@@ -22,7 +22,7 @@ class RealTimeRights {
   RealTimeRights(const RealTimeRights&) = delete;
   RealTimeRights& operator=(const RealTimeRights&) = delete;
 
-  /// One line on what was refused and how to get it; empty when nothing was.
+  /// One line on the refused rights and how to get them; empty if none was refused.
   [[nodiscard]] const std::string& refused() const noexcept { return refused_; }
 
  private:
@@ -31,8 +31,8 @@ class RealTimeRights {
   std::string refused_;
 };
 
-/// Keeps the calling thread, and those that it starts from now on, off a processor, where there are others.
-/// Throws Error when the machine has no such processor, or this process may not use it.
+/// Keeps the calling thread, and those that it starts from now on, off a processor if there are others.
+/// Throws Error if the machine has no such processor, or this process may not use it.
 void leave_to_the_loop(int processor);
 
 }  // namespace palpate

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-/// The model of a recording. Throws Error where it is not there.
+/// Finds the model of a recording. Throws Error if it is missing.
 std::filesystem::path find_model(const RecordingFile& recording) {
   const std::filesystem::path was = recording.info().model_path;
   const std::filesystem::path beside = recording.path().parent_path();

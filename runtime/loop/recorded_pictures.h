@@ -1,4 +1,4 @@
-// The pictures of a recording, whether they are stored or not.
+// Pictures of a recording, stored or computed.
 #pragma once
 
 #include <memory>
@@ -9,21 +9,21 @@
 
 namespace palpate {
 
-/// Shows the surface at the moments of a recording: as it is stored, or computed from the forces of its
-/// contacts by the model that it was recorded with. One thread uses it at a time.
+/// Provides the surface at the times of a recording: as stored, or computed from the contact forces with the
+/// model of the recording. For one thread at a time.
 class RecordedPictures {
  public:
-  /// `recording` must live as long. Where pictures are computed the model is looked for where it was, and
-  /// beside the recording; the first file with its content hash is loaded. Throws Error where there is none,
-  /// or it cannot be loaded.
+  /// `recording` must outlive this. If pictures are computed, the model is searched at its original path and
+  /// beside the recording; the first file with its content hash is loaded. Throws Error if there is none, or
+  /// it cannot be loaded.
   explicit RecordedPictures(const RecordingFile& recording);
 
-  /// Picture 0 .. pictures().size() - 1. Throws Error when it cannot be read.
+  /// Returns picture 0 .. pictures().size() - 1. Throws Error if it cannot be read.
   [[nodiscard]] SurfaceFrame frame(std::int64_t number);
 
  private:
   const RecordingFile& recording_;
-  std::unique_ptr<const Body> body_;  // null: pictures are stored
+  std::unique_ptr<const Body> body_;  // null if pictures are stored
   std::unique_ptr<PictureMaker> maker_;
 };
 

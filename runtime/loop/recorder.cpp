@@ -16,12 +16,12 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t ring_seconds = 16;   // ticks for which there is room
+constexpr std::size_t ring_seconds = 16;   // capacity for ticks
 constexpr std::size_t picture_ring = 256;  // four seconds at 60 Hz
 constexpr auto recorder_pause = std::chrono::milliseconds(1);
 constexpr auto interval = std::chrono::milliseconds(500);  // between checkpoints
 
-constexpr int at_once = 1000;  // ticks between looks at the clock
+constexpr int at_once = 1000;  // ticks between readings of the clock
 
 constexpr double seconds(std::chrono::milliseconds time) {
   return 1e-3 * static_cast<double>(time.count());
@@ -36,7 +36,7 @@ constexpr std::array<std::pair<DeviceEvent, const char*>, 6> event_texts = {{
     {DeviceEvent::resumed, "the run goes on after a pause"},
 }};
 
-/// "phase: active"
+/// Formats an entry: "phase: active".
 template <class Names>
 std::string named(const char* what, const Names& names, std::uint8_t number) {
   for (const auto& [known, name] : names)
@@ -117,7 +117,7 @@ void Recorder::note_events(const TickRecord& tick) {
   last_ = tick;
 }
 
-/// Those of times before this one; whether there were any.
+/// Writes the pictures of times before `before`; returns true if there were any.
 bool Recorder::take_pictures(double before) {
   const auto time_of = [](const auto& picture) { return picture.time; };
   for (bool any = false;; any = true) {
@@ -140,8 +140,8 @@ void Recorder::take(const TickRecord& tick) {
   last_time_ = tick.time;
 }
 
-/// Each picture comes after its tick and before the next, where it is there by then. Whether anything was in
-/// the rings.
+/// Writes queued ticks and pictures, each picture between its tick and the next if it has arrived by then.
+/// Returns true if there were any.
 bool Recorder::take_all(bool closing) {
   TickRecord tick;
   int ticks = 0;

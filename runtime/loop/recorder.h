@@ -1,4 +1,4 @@
-// From the tick to the recording, without the tick ever touching a file.
+// Recorder: writes ticks to a recording without file access in the tick.
 #pragma once
 
 #include <atomic>
@@ -17,53 +17,52 @@
 
 namespace palpate {
 
-/// Ticks from one frame to the next, 1 or more, where so many frames a second are wanted (above 0).
+/// Returns the number of ticks between frames, at least 1, for a rate of frames per second (above 0).
 [[nodiscard]] std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept;
 
-/// What shows the surface: where contact forces say all, these alone.
+/// Picture of the surface: the contact forces alone, if they determine it.
 using RecordedPicture = std::variant<ContactLoads, SurfaceFrame>;
 
-/// A thread that writes a session to a recording, fed through bounded lock-free rings: of ticks by one other
-/// thread, of pictures by one too. Every half second all of it is put into the recording, so that no more
-/// is lost however the program ends; where ticks are waited for, every half second of their own time, so that
-/// equal runs make equal files. Where that fails (a full disk) nothing is kept any more, the reason is
-/// told at once, and the run goes on.
+/// Thread that writes a session to a recording, fed through bounded lock-free rings: one thread pushes ticks,
+/// one pushes pictures. A checkpoint every half second bounds the loss however the program ends; if pushes
+/// wait, the half second is that of the ticks, so that equal runs produce equal files. After a failure (a
+/// full disk) nothing more is kept, the reason is reported at once, and the run continues.
 class Recorder {
  public:
-  /// Takes the reason why nothing is kept any more; called once at most, by the recorder's thread.
+  /// Receives the reason of the failure; called at most once, by the recorder's thread.
   using OnFailure = std::function<void(const Error& reason)>;
 
-  /// Starts writing to `path`, in the place of what was there. Throws Error when it cannot be made.
+  /// Starts writing to `path`, replacing an existing file. Throws Error if it cannot be created.
   Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface = {},
            OnFailure on_failure = {});
-  ~Recorder();  ///< without `finish`, the recording is left as if the program had been killed
+  ~Recorder();  ///< without `finish`, leaves the recording as if the program had been killed
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Hands a tick over; never blocks. A full ring drops it and counts.
+  /// Queues a tick; never blocks. If the ring is full, the tick is dropped and counted.
   void push(const TickRecord& tick) noexcept;
-  /// Hands a picture over, likewise.
+  /// Queues a picture; never blocks. If the ring is full, it is dropped and counted.
   void push_picture(RecordedPicture picture) noexcept;
 
-  /// Hands a tick over, waiting for room. Only for runs that nobody feels.
+  /// Queues a tick, waiting for capacity. Only for runs without a person's hand.
   void push_waiting(const TickRecord& tick) noexcept;
-  /// Hands a picture over, likewise.
+  /// Queues a picture, waiting for capacity. Only for runs without a person's hand.
   void push_picture_waiting(RecordedPicture picture) noexcept;
 
-  /// Writes what is left, and the index. Throws Error when any of it could not be written; what could is in
+  /// Writes the remaining data and the index. Throws Error if any part could not be written; the rest is in
   /// the recording.
   void finish();
 
-  /// Ticks for which there was no room, or no disk any more: those of the rings too, which it did not reach.
+  /// Number of ticks lost to a full ring or a failed disk, including queued ones that were never written.
   [[nodiscard]] std::int64_t dropped() const noexcept { return ticks_given_.dropped(failed_); }
-  /// Pictures likewise.
+  /// Number of pictures lost in the same ways.
   [[nodiscard]] std::int64_t dropped_pictures() const noexcept { return pictures_given_.dropped(failed_); }
 
  private:
   struct Given {
     std::atomic<std::int64_t> all = 0;
     std::atomic<std::int64_t> without_room = 0;
-    std::atomic<std::int64_t> kept = 0;  // once it has failed
+    std::atomic<std::int64_t> kept = 0;  // after a failure
 
     [[nodiscard]] std::int64_t dropped(bool failed) const noexcept {
       return failed ? all.load() - kept.load() : without_room.load();
@@ -87,12 +86,12 @@ class Recorder {
   std::atomic<bool> failed_ = false;
   std::exception_ptr failure_;
   Given ticks_given_, pictures_given_;
-  std::atomic<bool> waits_ = false;  // what is pushed
-  // Of the thread:
-  TickRecord last_;                      // that was written
-  double last_time_ = -1.0;              // and its time, -1 before the first
-  double kept_until_ = 0.0;              // time of the last checkpoint, where ticks are waited for
-  std::optional<RecordedPicture> next_;  // picture that is not written yet
+  std::atomic<bool> waits_ = false;  // pushes wait
+  // Used by the thread alone.
+  TickRecord last_;                      // last tick written
+  double last_time_ = -1.0;              // its time; -1 before the first
+  double kept_until_ = 0.0;              // time of the last checkpoint, if pushes wait
+  std::optional<RecordedPicture> next_;  // picture not yet written
   std::thread thread_;
 };
 

@@ -16,7 +16,7 @@ bool same(const double (&a)[n], const double (&b)[n]) noexcept {
   return std::equal(std::begin(a), std::end(a), std::begin(b), same_bits);
 }
 
-/// The first that differs of what a tick computes, in that order; null where all is the same.
+/// Returns the first field, in order of computation, that differs between two ticks; null if all are equal.
 const char* first_different_field(const TickRecord& now, const TickRecord& then) noexcept {
   if (now.motion_step != then.motion_step) return "motion_step";
   if (now.patch != then.patch) return "patch";
@@ -67,7 +67,7 @@ DeviceNews ReplayDevice::poll(const TickTime& tick) noexcept {
   news.state.velocity = Vec3(then.handle_velocity);
   news.state.buttons = then.buttons;
   news.state.sequence = then.sequence;
-  const std::int64_t due = tick.number * 1'000'000'000 / session_.info().rate;  // since the start, as then
+  const std::int64_t due = tick.number * 1'000'000'000 / session_.info().rate;  // from the start, as then
   news.state.arrived = tick.due - due + then.arrived_ns;
   news.begun = tick.due - due + then.begun_ns;
   news.events = static_cast<DeviceEvent>(then.event);

@@ -23,7 +23,7 @@ std::uint32_t all_status_bits() {
   return bits;
 }
 
-/// Whether one of the names belongs to this number.
+/// True if one of the names belongs to this number.
 template <class Names>
 bool is_named(const Names& names, std::uint8_t number) {
   return std::any_of(names.begin(), names.end(), [number](const auto& named) {

@@ -1,4 +1,4 @@
-// Recordings that a replay and a viewer can trust.
+// Checks of recordings, so that replay and viewer can trust them.
 #pragma once
 
 #include <filesystem>
@@ -8,14 +8,14 @@
 
 namespace palpate {
 
-/// Proves that the ticks of a recording hold only phases, faults, events and status bits that there are.
-/// Throws Error (the field is named).
+/// Checks that the ticks of a recording hold only known phases, faults, events and status bits. Throws Error
+/// that names the field.
 void check_session(const RecordingFile& session);
 
 /// Opens a recording and checks it. Throws Error.
 RecordingFile open_session(const std::filesystem::path& path);
 
-/// Proves that a replay on this body finds the nodes round which the session had its overlays. Throws Error.
+/// Checks that the body has the nodes around which the session had its overlays. Throws Error.
 void check_overlays(const RecordingFile& session, const Body& body);
 
 }  // namespace palpate

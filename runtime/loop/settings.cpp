@@ -28,9 +28,9 @@ constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::inf
                                            "greater than 0, or inf"};
 constexpr bool protects_hand = true;
 
-constexpr double usual_edge = 0.1;  // [radius] by which the edge of a disc is rounded
+constexpr double usual_edge = 0.1;  // [radius] default rounding of a disc's edge
 
-/// A part NAME=VALUE.
+/// Part NAME=VALUE of a setting.
 struct Part {
   std::string_view name;
   std::string_view value;
@@ -45,7 +45,7 @@ Part split_part(std::string_view part) {
   throw Error(what, "--" + std::string(name), hint);
 }
 
-// What each kind of setting is written as, and read from.
+// Text form of each kind of setting.
 
 std::string text_of(const auto& value) {
   return fmt::format("{}", value);
@@ -137,7 +137,7 @@ void read_value(const Setting& setting, const std::string& text, ContactModel& c
     refuse(setting.name, "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
 }
 
-/// The one of some values that has this name.
+/// Returns the value with this name.
 template <class Value>
 Value read_name(const Setting& setting, const std::string& text, std::initializer_list<Value> values) {
   std::string names;
@@ -357,7 +357,7 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
         wall_friction);
 }
 
-/// Visits the settings of the loop, and of where the device is in the body's frame.
+/// Visits the settings of the loop and of the device's frame in the body's.
 template <class SomeSettings, class Visitor>
 void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
   constexpr SettingGroup group = SettingGroup::workspace;
@@ -380,8 +380,8 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
         s.axes);
 }
 
-/// Calls visit(setting, value) for each setting. A member that is added to Settings must be named here, or
-/// nothing compiles.
+/// Calls visit(setting, value) for each setting. A new member of Settings must be named here, otherwise this
+/// does not compile.
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
   auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_law,

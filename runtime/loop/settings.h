@@ -1,4 +1,4 @@
-// What the outcome of a session follows from, beside the model and the hand; as text too.
+// Settings that, beside the model and the hand, determine a session; with their text form.
 #pragma once
 
 #include <cstdint>
@@ -19,79 +19,79 @@
 
 namespace palpate {
 
-inline constexpr NumberRange tick_rates{1000.0, 5000.0, true, true, "from 1000 to 5000"};  ///< ticks a second
+inline constexpr NumberRange tick_rates{1000.0, 5000.0, true, true, "from 1000 to 5000"};  ///< [ticks/s]
 
-/// Each is an option of `palpate-runtime play`, by whose name it stands in a recording; settings_table has
-/// them.
+/// Settings of a session. Each is an option of `palpate-runtime play` and has the same name in a recording;
+/// settings_table lists them.
 struct Settings {
-  Tool tool;                    ///< but for its reach
-  std::optional<double> reach;  ///< [m]; else the longest edge of the surface
+  Tool tool;                    ///< its reach is in `reach`
+  std::optional<double> reach;  ///< [m]; default: the longest edge of the surface
   Index max_contacts = 256;
   ContactModel contact = ContactModel::quasi_static;
-  double load_scale = 1.0;                ///< of the file's loads
-  double stiffness_scale = 1.0;           ///< of all Young's moduli
-  std::optional<OverlayOptions> overlay;  ///< none: the body's own mesh
+  double load_scale = 1.0;                ///< factor on the file's loads
+  double stiffness_scale = 1.0;           ///< factor on all Young's moduli
+  std::optional<OverlayOptions> overlay;  ///< empty: the body's own mesh
   PatchLaw overlay_law = PatchLaw::linear;
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
-  bool warp = false;                                         ///< Green's functions turn with the body
+  bool warp = false;                                         ///< Green's functions rotate with the body
   LiveSettings live;                                         ///< a solver in place of Green's functions
-  std::int64_t rate = 1000;                                  ///< ticks a second
+  std::int64_t rate = 1000;                                  ///< ticks per second
   double motion_scale = 1.0;                                 ///< as in WorkspaceOptions
   double force_scale = 1.0;
-  std::optional<Vec3> origin;           ///< where the device's origin lies in the body's frame [m]
-  std::string axes = "x,y,z";           ///< the body's axes along the device's
-  std::optional<SafetyOptions> safety;  ///< none: off where nobody feels it, else the defaults
+  std::optional<Vec3> origin;           ///< origin of the device in the body's frame [m]
+  std::string axes = "x,y,z";           ///< the body's axes along the device's axes
+  std::optional<SafetyOptions> safety;  ///< empty: off if no person feels it, otherwise the defaults
 
   [[nodiscard]] WorkspaceOptions workspace() const;
   [[nodiscard]] BodyOptions body() const;
 };
 
-/// What a setting is of: its place in the help. The loop's and the workspace's stay as they are in a run.
+/// Section of the help. Settings of the loop and the workspace are constant during a run.
 enum class SettingGroup : std::uint8_t { tool, body, live, loop, workspace, safety };
 
-/// A setting as options, recordings, pages and the documentation have it.
+/// Description of a setting for options, recordings, pages and the documentation.
 struct Setting {
-  const char* name;  ///< of the option, without dashes
+  const char* name;  ///< name of the option, without dashes
   SettingGroup group;
-  const char* value;      ///< what is written for it
-  const char* unit;       ///< of a number, "" where it has none
-  std::string otherwise;  ///< what holds where it is left out
+  const char* value;      ///< placeholder of the value in the help
+  const char* unit;       ///< unit of a number; empty if it has none
+  std::string otherwise;  ///< default
   std::string meaning;
-  NumberRange range{};         ///< of a number
-  bool is_told = true;         ///< in recordings of the settings that it was made for
-  bool protects_hand = false;  ///< it decides how strong and how sudden the force on a hand may be
+  NumberRange range{};         ///< for a number
+  bool is_told = true;         ///< stored in recordings' settings
+  bool protects_hand = false;  ///< it bounds the size or rate of the force on a hand
 };
 
 /// All settings, in the order of recordings.
 [[nodiscard]] const std::vector<Setting>& settings_table();
 
-/// The setting of a name, null for none.
+/// Returns the setting with this name; null if there is none.
 [[nodiscard]] const Setting* find_setting(std::string_view name);
 
-/// A line NAME=VALUE for each that is told; numbers read back to the same bits.
+/// Returns a line NAME=VALUE for each stored setting; numbers read back exactly.
 [[nodiscard]] std::string to_text(const Settings& settings);
 
-/// Options by name, as they are written.
+/// Options by name, as text.
 using SettingsText = std::map<std::string, std::string>;
 
-/// What they mean; what is left out has its default. Throws Error whose `where` is the option, also for one
-/// that there is not.
+/// Parses settings; missing ones have their defaults. Throws Error whose `where` is the option, also for an
+/// unknown option.
 [[nodiscard]] Settings read_settings(const SettingsText& text);
 
-/// The lines of `to_text` that are options; others, of a later version, are left out.
+/// Returns the lines of `to_text` that are options; others, from a later version, are dropped.
 [[nodiscard]] SettingsText split_settings(std::string_view lines);
 
-// Of one option each; they throw Error whose `where` is the option.
+// Parsers of single options; they throw Error whose `where` is the option.
 
-/// "point", "sphere:RADIUS", "capsule:RADIUS,LENGTH", "disc:RADIUS" or "disc:RADIUS,EDGE" [m].
+/// Parses "point", "sphere:RADIUS", "capsule:RADIUS,LENGTH", "disc:RADIUS" or "disc:RADIUS,EDGE" [m].
 [[nodiscard]] Tool parse_shape(const std::string& text);
-/// "r=3,rings=2", either part with its default when it is left out. `where`: the option.
+/// Parses "r=3,rings=2"; a missing part has its default. `where`: the option.
 [[nodiscard]] OverlayOptions parse_overlay(const std::string& text, const std::string& where);
-/// "x,-z,y": the body's axes along which the device's x, y and z point. Gives the rotation.
+/// Parses "x,-z,y": the body's axes along which the device's x, y and z point. Returns the rotation.
 [[nodiscard]] Eigen::Quaterniond parse_axes(const std::string& text);
-/// "max_force=5,ramp=0.5": what is not named has its default; "default" changes nothing.
+/// Parses "max_force=5,ramp=0.5"; missing bounds have their defaults; "default" changes nothing.
 [[nodiscard]] SafetyOptions parse_safety(const std::string& text);
-/// The names that parse_safety knows, with defaults, units and meanings, a line each.
+/// Returns the names for parse_safety, with defaults, units and meanings, a line each.
 [[nodiscard]] std::string safety_help();
 
 }  // namespace palpate

@@ -8,7 +8,7 @@ namespace palpate {
 namespace {
 
 constexpr auto feed_pause = std::chrono::milliseconds(33);
-constexpr std::size_t feed_room = 8192;  // ticks that may wait: more than a second of the fastest loop
+constexpr std::size_t feed_room = 8192;  // queued ticks: more than a second of the fastest loop
 
 }  // namespace
 

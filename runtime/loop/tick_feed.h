@@ -1,4 +1,4 @@
-// What is told of every tick, to whoever draws it.
+// Feed of all ticks to a viewer.
 #pragma once
 
 #include <atomic>
@@ -10,20 +10,20 @@
 
 namespace palpate {
 
-/// Hands the notes of all ticks on, about 30 times a second, from a thread of its own. Where it does not keep
-/// up, notes are lost, as their numbers tell.
+/// Passes the notes of all ticks on, about 30 times per second, from a thread of its own. If it falls behind,
+/// notes are lost, visible as gaps in their numbers.
 class TickFeed {
  public:
-  /// Takes ticks whose numbers follow one another.
+  /// Receives ticks with consecutive numbers.
   using Sink = std::function<void(std::span<const TickNote>)>;
 
-  /// `sink` is called by one thread and does not throw.
+  /// `sink` is called by one thread and must not throw.
   explicit TickFeed(Sink sink);
-  ~TickFeed();  ///< after the last note
+  ~TickFeed();  ///< passes the last notes on first
   TickFeed(const TickFeed&) = delete;
   TickFeed& operator=(const TickFeed&) = delete;
 
-  /// By the loop after each tick; never waits.
+  /// Passes a tick from the loop; never waits.
   void push(TickNote note) noexcept { notes_.push(note); }
 
  private:
