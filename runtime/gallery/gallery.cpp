@@ -12,7 +12,7 @@
 namespace palpate {
 
 int show_gallery(const std::filesystem::path& folder, const ViewerOptions& options) {
-  sigset_t ends;  // blocked before the server's thread begins, which inherits that
+  sigset_t ends;  // blocked before the server's thread starts, which inherits the mask
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);

@@ -1,4 +1,4 @@
-// palpate-runtime view FOLDER: all that is in a folder, to choose from.
+// palpate-runtime view FOLDER: gallery of the files in a folder.
 #pragma once
 
 #include <filesystem>

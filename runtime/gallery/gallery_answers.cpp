@@ -37,7 +37,7 @@ std::string name_in(const RequestHeader& request) {
   return query_value(text_view(request.target()), "name");
 }
 
-/// Asks for a change.
+/// True for a request that changes something.
 bool is_deed(std::string_view path) {
   return path == "/open" || path == "/close" || path == "/drop";
 }
@@ -146,7 +146,7 @@ std::optional<std::string> GalleryAnswers::find(const std::string& name) const {
   std::error_code problem;
   if (gallery_kind(name) && std::filesystem::is_regular_file(folder_ / name, problem)) return name;
   for (const GalleryItem& item : list_gallery(folder_))
-    if (json_text(json(item.name)) == json_text(json(name))) return item.name;  // is not UTF-8
+    if (json_text(json(item.name)) == json_text(json(name))) return item.name;  // name that is not UTF-8
   return std::nullopt;
 }
 

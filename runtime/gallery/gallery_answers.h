@@ -1,4 +1,4 @@
-// What the gallery answers by HTTP.
+// HTTP answers of the gallery.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,13 @@
 
 namespace palpate {
 
-/// The most that a file may have that is dropped on the page [bytes].
+/// Largest size of a file dropped on the page [byte].
 inline constexpr std::uint64_t largest_drop = std::uint64_t{8} << 30U;
 
-/// A part of a request's target, `name` of ?name=...&..., with its escapes undone. Empty where it is not
-/// there.
+/// Returns a parameter of a request's target, `name` of ?name=...&..., unescaped. Empty if it is absent.
 [[nodiscard]] std::string query_value(std::string_view target, std::string_view name);
 
-/// The folder and what of it is shown. For the server's thread.
+/// Contents of the folder and the item that is shown. For the server's thread.
 class GalleryAnswers {
  public:
   GalleryAnswers(std::filesystem::path folder, ViewerOptions options)
@@ -28,24 +27,24 @@ class GalleryAnswers {
 
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
-  /// Why a request is not answered. The page, which is the same for everybody, needs no token.
+  /// Refusal of a request; empty if it is accepted. The page itself is public and needs no token.
   [[nodiscard]] static std::optional<Response> refusal(const RequestHeader& request,
                                                        const ServedAddress& served);
   [[nodiscard]] static bool wants_page(const RequestHeader& request);
   [[nodiscard]] static Response page(const RequestHeader& request, const ServedAddress& served);
-  /// Whether it asks for what takes a look into a file.
+  /// True for a request that requires reading a file.
   [[nodiscard]] static bool wants_scene(const RequestHeader& request);
-  /// To that. Waits for the look; any thread may.
+  /// Answers such a request. Waits for the file; for any thread.
   [[nodiscard]] Response scene(const RequestHeader& request) const;
-  /// Whether it brings a file, whose bytes are to be read.
+  /// True for a request that uploads a file, whose bytes must be read.
   [[nodiscard]] static bool brings_file(const RequestHeader& request);
-  /// Why the file that it brings is not taken.
+  /// Refusal of the uploaded file; empty if it is accepted.
   [[nodiscard]] static std::optional<Response> drop_refusal(const RequestHeader& request);
-  /// The file has come, under a temporary name in the folder: it is given the name that the request has for
-  /// it, or one like it that is free. Throws Error.
+  /// Renames the uploaded file, complete under a temporary name in the folder, to the requested name or a
+  /// similar free one. Throws Error.
   [[nodiscard]] Response keep_file(const RequestHeader& request,
                                    const std::filesystem::path& temporary) const;
-  /// To all other requests.
+  /// Answers all other requests.
   [[nodiscard]] Response answer(const RequestHeader& request, const ServedAddress& served);
 
  private:
@@ -53,7 +52,7 @@ class GalleryAnswers {
   [[nodiscard]] Response open(const std::string& name, std::uint16_t port);
   [[nodiscard]] Response close();
   [[nodiscard]] Response opened() const;
-  /// The file of this name, as the list has it; nothing where there is none.
+  /// Returns the file with this name from the list; empty if there is none.
   [[nodiscard]] std::optional<std::string> find(const std::string& name) const;
 
   std::filesystem::path folder_;

@@ -19,9 +19,9 @@ using boost::asio::ip::tcp;
 using namespace std::chrono_literals;
 
 constexpr std::uint32_t longest_header = 8192;  // [bytes]
-constexpr auto request_time = 10s;              // for a header to be said
-constexpr auto response_time = 30s;             // for an answer to be taken
-constexpr auto file_time = 1h;                  // for a file to come
+constexpr auto request_time = 10s;              // to receive a header
+constexpr auto response_time = 30s;             // for the client to read an answer
+constexpr auto file_time = 1h;                  // to receive a file
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// One request to a gallery.
+// Connection of a gallery, for one request.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -14,7 +14,7 @@
 
 namespace palpate {
 
-/// The server as its connections see it, on its thread.
+/// Server as its connections see it, on its thread.
 class GalleryHost {
  public:
   virtual ~GalleryHost() = default;
@@ -22,17 +22,17 @@ class GalleryHost {
   [[nodiscard]] virtual const ServedAddress& served() const noexcept = 0;
   [[nodiscard]] virtual GalleryAnswers& answers() noexcept = 0;
   [[nodiscard]] virtual Reception& reception() noexcept = 0;
-  /// Has another thread look, one file after the other, and answers on this one.
+  /// Runs `look` in another thread, one file at a time, and answers on this one.
   virtual void look_then(std::function<Response()> look, std::function<void(Response)> answer) = 0;
 };
 
-/// Reads it, has it answered, and is gone. For the server's thread.
+/// Reads one request, has it answered and closes. For the server's thread.
 class GalleryConnection : public Received, public std::enable_shared_from_this<GalleryConnection> {
  public:
-  /// `server` must live as long.
+  /// `server` must outlive this.
   GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryHost& server)
       : stream_(std::move(socket)), server_(server) {}
-  ~GalleryConnection() override;  ///< a file that has not come whole is removed
+  ~GalleryConnection() override;  ///< removes a file that was not received completely
   GalleryConnection(const GalleryConnection&) = delete;
   GalleryConnection& operator=(const GalleryConnection&) = delete;
 
@@ -53,7 +53,7 @@ class GalleryConnection : public Received, public std::enable_shared_from_this<G
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   std::optional<FileParser> file_;
-  std::filesystem::path temporary_;  // where the file comes; empty: none does
+  std::filesystem::path temporary_;  // file being received; empty: none
   std::optional<Response> response_;
 };
 

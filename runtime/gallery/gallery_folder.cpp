@@ -44,18 +44,18 @@ std::string_view ending_of(std::string_view name) {
   return longest;
 }
 
-/// Most pictures in a folder are of something else: they become bodies where they are dropped.
+/// Most pictures in a folder are unrelated; only dropped ones become bodies.
 bool is_picture(std::string_view name) {
   return ending_of(name) == ".png" || ending_of(name) == ".pbm";
 }
 
-/// NAME of NAME.palpate.hdf, NAME.stl, NAME.model.toml; "model" of "model.toml".
+/// Returns NAME of NAME.palpate.hdf, NAME.stl, NAME.model.toml; "model" of "model.toml".
 std::string_view stem_of(std::string_view name) {
   const std::string_view ending = ending_of(name) == "model.toml" ? ".toml" : ending_of(name);
   return name.substr(0, name.size() - ending.size());
 }
 
-/// What is made of a file, or goes on beside it, begins with its stem and a dot.
+/// True if the folder has a file whose name begins with the stem and a dot, as all files derived from one do.
 bool has_any_of(const fs::path& folder, const std::string& stem) {
   std::error_code problem;
   for (fs::directory_iterator at(folder, problem), end; !problem && at != end; at.increment(problem))
@@ -68,7 +68,7 @@ double seconds_since_1970(fs::file_time_type time) {
   return std::chrono::duration<double>(system.time_since_epoch()).count();
 }
 
-/// Nothing where it is gone meanwhile, or no plain file.
+/// Returns nothing if the file is gone or not regular.
 std::optional<GalleryItem> item_of(const fs::directory_entry& entry) {
   const std::string name = entry.path().filename().string();
   const std::optional<GalleryKind> kind = gallery_kind(name);

@@ -1,4 +1,4 @@
-// What there is in a folder to push, to look at or to make a body of.
+// Files of a folder that can be pushed, viewed or made into a body.
 #pragma once
 
 #include <cstdint>
@@ -10,35 +10,34 @@
 
 namespace palpate {
 
-/// Told by the name's ending.
+/// Kind of a file, given by the ending of its name.
 enum class GalleryKind : std::uint8_t {
   body,       ///< NAME.palpate.hdf
   recording,  ///< SESSION.mcap
-  source,     ///< what palpate-runtime push makes a body of: a surface, a labelled image, a description
+  source,     ///< input of palpate-runtime push: a surface, a labelled image, a description
 };
 
 struct GalleryItem {
-  std::string name;  ///< of the file in the folder
+  std::string name;  ///< file name in the folder
   GalleryKind kind = GalleryKind::body;
   std::int64_t bytes = 0;
   double modified = 0.0;  ///< [s] since 1970
 };
 
-/// What a file of this name is; nothing for a name that is none of a file here: hidden, with a folder in it,
-/// or with another ending.
+/// Returns the kind of a file of this name; empty for a hidden one, one with a folder, or another ending.
 [[nodiscard]] std::optional<GalleryKind> gallery_kind(std::string_view name);
 
-/// Bodies, then recordings, then sources that no body there was made of by name, without pictures; each by
-/// name. Throws Error where the folder cannot be read.
+/// Lists bodies, then recordings, then sources for which there is no body of the same name, except pictures;
+/// each sorted by name. Throws Error if the folder cannot be read.
 [[nodiscard]] std::vector<GalleryItem> list_gallery(const std::filesystem::path& folder);
 
-/// The body that is made of a source of this name: NAME.palpate.hdf for NAME.stl and for NAME.model.toml,
-/// whatever name that gives itself.
+/// Returns the name of the body made from a source: NAME.palpate.hdf for NAME.stl and for NAME.model.toml,
+/// whatever model name the description has.
 [[nodiscard]] std::string baked_name(std::string_view source);
 
-/// A name like `wanted` for a new file of the folder: `wanted` itself, or with a number before its ending.
-/// Nothing there begins with what is before the ending and a dot, so that neither the file nor what is made
-/// of it and lands beside it (NAME.model.toml, NAME.palpate.hdf, ...) meets another one.
+/// Returns a free name like `wanted` for a new file of the folder: `wanted` itself, or with a number before
+/// its ending. No file there begins with its stem and a dot, so neither the file nor those derived from it
+/// (NAME.model.toml, NAME.palpate.hdf, ...) collide with another one.
 [[nodiscard]] std::string free_name(const std::filesystem::path& folder, const std::string& wanted);
 
 }  // namespace palpate

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint32_t only_scene = 1;
 
-/// In space.
+/// Surface of a body in space at rest.
 RecordedSurface surface_at_rest(const Model& model) {
   SurfaceNumbering numbering = number_surface(model.surface, model.mesh.nodes.size());
   RecordedSurface surface;
@@ -34,7 +34,7 @@ double felt(const TickRecord& tick) {
   return tick.force[0] * tick.force[0] + tick.force[1] * tick.force[1] + tick.force[2] * tick.force[2];
 }
 
-/// The picture of the largest force that a tick with a picture felt.
+/// Returns the picture of the tick with the largest force, among ticks that have one.
 std::int64_t telling_picture(const RecordingFile& recording) {
   double largest = -1.0, time = 0.0;
   for (std::int64_t row = 0; row < recording.ticks(); ++row) {
@@ -48,7 +48,7 @@ std::int64_t telling_picture(const RecordingFile& recording) {
   return std::min(after - pictures.begin(), std::ssize(pictures) - 1);
 }
 
-/// In the telling picture. At rest where that cannot be computed: its model may be gone.
+/// Surface in that picture; at rest if it cannot be computed, since the model may be gone.
 RecordedSurface surface_as_pressed(const RecordingFile& file) {
   RecordedSurface surface = file.surface();
   if (file.pictures().empty() || surface.nodes.empty())

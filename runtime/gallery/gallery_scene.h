@@ -1,4 +1,4 @@
-// The small picture of a file, as its page draws it.
+// Thumbnail of a file, as its page draws it.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// The message `scene` (web/PROTOCOL.md) of the surface of a body at rest, in the plane of its elements, or
-/// of a recording's in the picture in which its tick felt most. Throws Error where the file is neither, or
+/// Returns the message `scene` (web/PROTOCOL.md) of a body's surface at rest (in the plane: its elements) or
+/// of a recording's surface in the picture with the largest force. Throws Error if the file is neither, or
 /// damaged.
 [[nodiscard]] std::string gallery_scene(const std::filesystem::path& file);
 

@@ -1,4 +1,4 @@
-// Serves the gallery.
+// Server of the gallery.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -15,12 +15,12 @@
 
 namespace palpate {
 
-/// HTTP in a thread of its own, which waits for nothing; files are looked at in another one.
+/// HTTP server in a thread of its own that never blocks; files are read in another one.
 class GalleryServer : public GalleryHost {
  public:
-  /// Serves `folder` at the port that `options` ask for. Throws Error (port in use, address unknown).
+  /// Serves `folder` at the port given by `options`. Throws Error (port in use, unknown address).
   GalleryServer(const std::filesystem::path& folder, const ViewerOptions& options);
-  ~GalleryServer() override;  ///< closes all connections, and ends what is shown
+  ~GalleryServer() override;  ///< closes all connections and ends the item that is shown
   GalleryServer(const GalleryServer&) = delete;
   GalleryServer& operator=(const GalleryServer&) = delete;
 

@@ -25,9 +25,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kept_lines = 12;
 constexpr std::size_t longest_line = 1 << 16;  // [bytes]
-constexpr int last_reads = 64;                 // of what a program that has ended printed
+constexpr int last_reads = 64;                 // reads of the remaining output of a program that has ended
 
-/// One of the next ports, so that pages find again what they keep by their address; else any that is free.
+/// Returns one of the next ports, so that pages find their stored settings under the same address; else any
+/// free one.
 std::uint16_t port_beside(ViewerOptions options) {
   constexpr int tries = 10;
   for (int k = 0; k < tries && options.port < UINT16_MAX; ++k) {
@@ -35,7 +36,7 @@ std::uint16_t port_beside(ViewerOptions options) {
     try {
       const ViewerPort free(options);
       return options.port;
-    } catch (const Error&) {  // another program has it
+    } catch (const Error&) {  // used by another program
     }
   }
   return 0;
@@ -59,13 +60,13 @@ std::optional<OpenedItem::Page> page_told(const std::string& line) {
   return OpenedItem::Page{static_cast<std::uint16_t>(port), token};
 }
 
-/// The program, and what the thread knows of it.
+/// Running program, with the state of the thread that watches it.
 struct OpenedItem::Running {
   std::unique_ptr<OtherProgram> program;
-  std::int64_t order = 0;  // that it follows
+  std::int64_t order = 0;  // order that started it
   std::optional<Clock::time_point> kill_at;
   bool prints = false;
-  std::string printed, told;  // of a line that has not come whole
+  std::string printed, told;  // incomplete lines
 };
 
 OpenedItem::OpenedItem(std::filesystem::path program, std::chrono::milliseconds time_to_end)
@@ -96,7 +97,7 @@ void OpenedItem::close() {
 
 OtherProgram::Start OpenedItem::start_of(const Wanted& wanted) const {
   const auto& [folder, name, gallery] = wanted;
-  const std::string file = (folder / name).string();  // whole: pages keep their looks by it
+  const std::string file = (folder / name).string();  // full path: pages store their settings under it
   const GalleryKind kind = *gallery_kind(name);
   std::vector<std::string> words = {kind == GalleryKind::recording ? "view" : "push", file};
   if (kind == GalleryKind::source)
@@ -127,13 +128,13 @@ std::optional<OpenedItem::State> OpenedItem::state() const {
   return state_;
 }
 
-/// The thread, with which the program ends.
+/// Main function of the thread; the program ends with it.
 void OpenedItem::work() {
   Running running;
   while (take_order(running)) listen(running);
 }
 
-/// Ends what is not wanted any more, and starts what is. False when all is over.
+/// Ends the program of the old order and starts that of the new one. Returns false when the thread must end.
 bool OpenedItem::take_order(Running& running) {
   std::optional<Wanted> wanted;
   {
@@ -161,7 +162,7 @@ bool OpenedItem::take_order(Running& running) {
   return true;
 }
 
-/// Waits for an order, or for what the program has to say or its end.
+/// Waits for an order, or for the program's output or end.
 void OpenedItem::listen(Running& running) {
   const OtherProgram* const program = running.program.get();
   std::array<pollfd, 3> heard = {
@@ -173,7 +174,7 @@ void OpenedItem::listen(Running& running) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(*running.kill_at - Clock::now());
     wait = static_cast<int>(std::max<std::int64_t>(left.count(), 0));
     if (wait == 0) running.program->send(SIGKILL);
-    if (wait == 0) wait = -1;  // its end comes now
+    if (wait == 0) wait = -1;  // killed: it ends at once
   }
   if (::poll(heard.data(), heard.size(), wait) <= 0) return;
   if (heard[0].revents != 0) {
@@ -197,7 +198,8 @@ void OpenedItem::hear_printed(Running& running) {
   if (is_rest && !running.printed.empty()) hear(running, std::exchange(running.printed, {}));
 }
 
-/// The program keeps this pipe to itself and open: where it ends, the program has ended.
+/// Reads the program's pipe. The program alone holds its other end open, so end of file means that it has
+/// ended.
 void OpenedItem::hear_told(Running& running) {
   const std::string text = running.program->read_told();
   running.told += text;
@@ -210,7 +212,7 @@ void OpenedItem::hear_told(Running& running) {
   running.told.erase(0, line + 1);
 }
 
-/// Lines of another order's program are for the terminal alone.
+/// Lines of an earlier order's program go to the terminal only.
 void OpenedItem::hear(const Running& running, const std::string& line) {
   std::string shown = printable(line);
   say(stderr, "{}\n", shown);

@@ -1,4 +1,4 @@
-// The file of the gallery that is shown.
+// File of the gallery that is shown.
 #pragma once
 
 #include <chrono>
@@ -19,46 +19,46 @@
 
 namespace palpate {
 
-/// One file at a time, shown by a palpate-runtime of its own at a port of its own: a body is played, a
-/// recording is viewed, and of a source a body is made first. So a body that is large, or ends badly, leaves
-/// the gallery as it is. A thread looks after that program; no other one ever waits for it.
+/// Shows one file at a time, by a palpate-runtime of its own at a port of its own: a body is played, a
+/// recording is viewed, and a source is baked first. A body that is too large or crashes its program thus
+/// leaves the gallery intact. A thread watches the program; no other thread waits for it.
 class OpenedItem {
  public:
-  /// `program` is palpate-runtime: this one where it is empty. One that does not heed SIGTERM in
-  /// `time_to_end` is killed.
+  /// `program`: palpate-runtime; this one if empty. A program that ignores SIGTERM for `time_to_end` is
+  /// killed.
   explicit OpenedItem(std::filesystem::path program = {},
                       std::chrono::milliseconds time_to_end = std::chrono::seconds(10));
-  ~OpenedItem();  ///< ends what is shown, and waits for that
+  ~OpenedItem();  ///< ends the shown item and waits for its end
   OpenedItem(const OpenedItem&) = delete;
   OpenedItem& operator=(const OpenedItem&) = delete;
 
-  /// A file to show.
+  /// File to show.
   struct Wanted {
-    std::filesystem::path folder;  ///< of the gallery: what is recorded and made lands there
-    std::string name;              ///< of a file of it
-    ViewerOptions gallery;         ///< as the gallery itself is served
+    std::filesystem::path folder;  ///< folder of the gallery; recordings and bodies are written there
+    std::string name;              ///< file name in the folder
+    ViewerOptions gallery;         ///< options of the gallery itself
   };
 
-  /// Shows it, at one of the next ports, once what was shown before has ended: two large bodies at once are
-  /// too much.
+  /// Shows a file at one of the next ports, once the one shown before has ended: two large bodies may not fit
+  /// into memory.
   void open(Wanted wanted);
-  /// Ends what is shown.
+  /// Ends the shown item.
   void close();
 
-  /// Where it is shown.
+  /// Address of the shown item.
   struct Page {
     std::uint16_t port = 0;
-    std::string token;  ///< as random_token gives it
+    std::string token;  ///< from random_token
   };
 
-  /// How far it is.
+  /// Progress of the shown item.
   struct State {
     std::string name;
-    std::deque<std::string> said;  ///< the last lines of its program, fit to be shown
-    std::optional<Page> page;      ///< none yet
-    bool has_ended = false;        ///< `said` tells why, where it has never been shown
+    std::deque<std::string> said;  ///< last lines of its program, printable
+    std::optional<Page> page;      ///< empty until it is served
+    bool has_ended = false;        ///< `said` has the reason if it was never served
   };
-  [[nodiscard]] std::optional<State> state() const;  ///< nothing: none is open
+  [[nodiscard]] std::optional<State> state() const;  ///< empty: nothing is open
 
  private:
   struct Running;
@@ -77,15 +77,15 @@ class OpenedItem {
   std::filesystem::path program_;
   std::chrono::milliseconds time_to_end_;
   FileDescriptor wake_;
-  mutable std::mutex mutex_;      // of what follows
-  std::int64_t ordered_ = 0;      // counts calls of open and close
-  std::optional<Wanted> wanted_;  // not begun yet
+  mutable std::mutex mutex_;      // guards the following
+  std::int64_t ordered_ = 0;      // number of calls of open and close
+  std::optional<Wanted> wanted_;  // not yet started
   std::optional<State> state_;
   bool is_over_ = false;
   std::thread thread_;
 };
 
-/// The page that a line of JSON tells of (tell_address); nothing where it is another text.
+/// Parses the page from a line of JSON (tell_address); empty for any other text.
 [[nodiscard]] std::optional<OpenedItem::Page> page_told(const std::string& line);
 
 }  // namespace palpate
