@@ -26,12 +26,12 @@ bool is_program(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file, error) && ::access(file.c_str(), X_OK) == 0;
 }
 
-/// The last word of a program's name: "precompute".
+/// Returns the last word of a program's name: "precompute".
 std::string folder_name(const std::string& name) {
   return name.substr(name.rfind('-') + 1);
 }
 
-/// While it lives, signals of a person are left to the other program.
+/// Leaves a person's signals to the other program during its lifetime.
 class LeaveSignals {
  public:
   LeaveSignals() {
@@ -50,14 +50,14 @@ class LeaveSignals {
   std::array<struct sigaction, signals.size()> before_{};
 };
 
-/// A child begins with no signal blocked, whatever its parent waits for.
+/// Unblocks all signals in a child, whatever its parent blocks.
 void let_all_signals() {
   sigset_t none;
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-/// A pipe, closed on exec.
+/// Creates a pipe, closed on exec.
 std::array<int, 2> make_pipe(const std::filesystem::path& program) {
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC) == 0) return pipe;
@@ -65,13 +65,13 @@ std::array<int, 2> make_pipe(const std::filesystem::path& program) {
               "close other programs and try again");
 }
 
-/// No other file descriptor of this program is its own, as they are closed on exec.
+/// Becomes the program. Other file descriptors of this one are closed on exec.
 [[noreturn]] void be_program(int output, int told, const OtherProgram::Start& start) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   dup2(output, start.read == OtherProgram::Stream::output ? STDOUT_FILENO : STDERR_FILENO);
   if (told == told_descriptor) fcntl(told, F_SETFD, 0);
   if (told >= 0) dup2(told, told_descriptor);
-  if (told >= 0) ::close_range(told_descriptor + 1, ~0U, 0);  // sockets of a server too
+  if (told >= 0) ::close_range(told_descriptor + 1, ~0U, 0);  // including sockets of a server
   if (!start.has_terminal) {
     setpgid(0, 0);
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -132,7 +132,7 @@ OtherProgram::OtherProgram(const Start& start) : program_(start.program), leads_
     be_program(output[1], told[1], start);
   }
   if (process_ < 0) throw Error("cannot be started", program_.string(), "close other programs and try again");
-  if (leads_) setpgid(process_, process_);  // as it does itself: whichever comes first
+  if (leads_) setpgid(process_, process_);  // the child does the same: whichever comes first
   output_ = std::move(read);
   told_ = std::move(read_told);
 }
@@ -165,7 +165,7 @@ int OtherProgram::wait() {
 ProgramEnd run_other_program(const std::filesystem::path& program,
                              const std::vector<std::string>& arguments) {
   OtherProgram other({.program = program, .arguments = arguments});
-  const LeaveSignals signals;  // from now on: what it inherits is as it was
+  const LeaveSignals signals;  // after the start, so that the program inherits the original handlers
   ProgramEnd end;
   for (std::string text = other.read(); !text.empty(); text = other.read()) end.output += text;
   end.status = other.wait();

@@ -1,4 +1,4 @@
-// Programs beside this one.
+// Child processes that run another program.
 #pragma once
 
 #include <filesystem>
@@ -9,16 +9,15 @@
 
 namespace palpate {
 
-/// The program of this name beside the running one, in the folder of that name beside it (as in a build
-/// tree), or on the PATH. Throws Error where there is none.
+/// Finds the program of this name beside the running one, in the folder of that name beside it (as in a build
+/// tree), or on the PATH. Throws Error if there is none.
 [[nodiscard]] std::filesystem::path find_program(const std::string& name);
 
-/// The descriptor on which a program tells the one that started it something that no file's text can imitate.
+/// Descriptor for messages of a program to its parent, which no text of a file can imitate.
 inline constexpr int told_descriptor = 3;
 
-/// A program that runs beside this one, in a folder of its own if it is given one. Of what it prints one
-/// stream is read here, the other one goes where this program's does. It ends with the thread that started
-/// it. For one thread.
+/// Program that runs as a child, optionally in another working folder. One of its output streams is read
+/// here, the other is inherited. It ends with the thread that started it. For one thread.
 class OtherProgram {
  public:
   enum class Stream { output, errors };
@@ -27,47 +26,46 @@ class OtherProgram {
     std::filesystem::path program;
     std::vector<std::string> arguments;
     Stream read = Stream::output;
-    std::filesystem::path folder{};  ///< that it works in; empty: this program's
-    bool has_terminal = true;        ///< else it hears no keys of a person, nor signals that they send
-    bool tells =
-        false;  ///< it has `told_descriptor` to write to, and beside it no descriptor of this program
+    std::filesystem::path folder{};  ///< working folder; empty: this program's
+    bool has_terminal = true;        ///< otherwise it receives no keys or signals of a person
+    bool tells = false;              ///< it can write to `told_descriptor`, and inherits no other descriptor
   };
 
-  /// Throws Error where there is no room for another program.
+  /// Throws Error if no process can be created.
   explicit OtherProgram(const Start& start);
-  ~OtherProgram();  ///< ends it and waits for that
+  ~OtherProgram();  ///< ends it and waits for its end
   OtherProgram(const OtherProgram&) = delete;
   OtherProgram& operator=(const OtherProgram&) = delete;
 
-  /// What it prints next, at most some kilobytes; empty once it prints nothing more.
+  /// Returns its next output, at most some kilobytes; empty at the end of the output.
   [[nodiscard]] std::string read();
-  /// What it tells next, likewise. A program that keeps the descriptor to itself tells nothing more once it
-  /// has ended.
+  /// Returns its next message, likewise. If the program does not pass the descriptor on, the messages end
+  /// with the program.
   [[nodiscard]] std::string read_told();
-  /// To wait for what it prints, and for what it tells (-1 where it does not).
+  /// Descriptors to poll for its output and its messages (-1 without messages).
   [[nodiscard]] int printed() const noexcept { return output_.get(); }
   [[nodiscard]] int told() const noexcept { return told_.get(); }
-  /// Sends it a signal, without a terminal to all that it has started too.
+  /// Sends a signal to it; without a terminal, also to its own children.
   void send(int signal) noexcept;
-  /// Its exit status, once it has ended; 128 + the signal that ended it. Throws Error where it could not be
-  /// started at all.
+  /// Waits and returns its exit status; 128 + the signal that ended it. Throws Error if it could not be
+  /// started.
   int wait();
 
  private:
   std::filesystem::path program_;
-  bool leads_ = false;  // a process group
+  bool leads_ = false;  // of a process group
   FileDescriptor output_, told_;
   int process_ = -1;
 };
 
-/// How another program ended.
+/// Result of another program.
 struct ProgramEnd {
   int status = 0;      ///< exit status; 128 + the signal that ended it
-  std::string output;  ///< what it printed
+  std::string output;  ///< its output
 };
 
-/// Runs a program to its end. Its error stream is this one's; SIGINT and SIGTERM are for it to handle, and it
-/// ends with this process. Throws Error where it cannot be started.
+/// Runs a program to its end. It inherits the error stream, handles SIGINT and SIGTERM, and ends with this
+/// process. Throws Error if it cannot be started.
 [[nodiscard]] ProgramEnd run_other_program(const std::filesystem::path& program,
                                            const std::vector<std::string>& arguments);
 

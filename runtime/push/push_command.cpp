@@ -30,7 +30,7 @@ void add_handed_on(CLI::App& push, PushArguments& arguments, const std::string& 
       ->group(precompute_group);
 }
 
-/// The file that palpate-precompute's report names.
+/// Returns the file named in palpate-precompute's report.
 std::string output_of(const std::string& report) {
   const nlohmann::json json = nlohmann::json::parse(report, nullptr, false);
   if (!json.is_object() || !json.contains("models") || json["models"].empty() ||

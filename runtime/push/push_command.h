@@ -10,29 +10,29 @@
 
 namespace palpate {
 
-/// As they were written.
+/// Arguments as given on the command line.
 struct PushArguments {
   std::string file;
-  std::vector<std::string> for_precompute;  ///< options that are handed on, with their values
+  std::vector<std::string> for_precompute;  ///< options passed on to it, with their values
   std::optional<std::string> duration;
-  ViewerArguments viewer;  ///< of options that the caller adds
+  ViewerArguments viewer;  ///< options added by the caller
 };
 
 /// Adds the subcommand.
 CLI::App* add_push(CLI::App& app, PushArguments& arguments);
 
-/// Whether the file is baked already, by its name. Throws CLI::ParseError where it is and options are given
-/// that only a bake has a use for.
+/// True if the file is baked already, by its name. Throws CLI::ParseError if it is and options for baking are
+/// given.
 [[nodiscard]] bool is_baked(const PushArguments& arguments);
 
-/// What came of a bake.
+/// Result of a bake.
 struct Baked {
-  int status = 0;    ///< exit status of palpate-precompute, which has told what was wrong
-  std::string file;  ///< that was written, or was there already and up to date
+  int status = 0;    ///< exit status of palpate-precompute, which has printed the error
+  std::string file;  ///< written, or already up to date
 };
 
-/// Bakes by palpate-precompute, in a process of its own, what is not baked yet. Throws Error where the
-/// program is not there or does not say what it wrote.
+/// Bakes the file by palpate-precompute, in a process of its own, unless it is baked already. Throws Error if
+/// the program is missing or does not name its output.
 [[nodiscard]] Baked bake_first(const PushArguments& arguments);
 
 }  // namespace palpate

@@ -8,10 +8,10 @@
 namespace palpate {
 namespace {
 
-constexpr double falls = 0.5;  // [size of the body] from where it is to the floor
-constexpr double walls = 1.0;  // [size of the body] from it to each wall
+constexpr double falls = 0.5;  // [size of the body] from the body to the floor
+constexpr double walls = 1.0;  // [size of the body] from the body to each wall
 
-/// The lowest and the highest corner.
+/// Lowest and highest corner of the box around the body, as text.
 std::string room_around(const Eigen::AlignedBox3d& body, int up) {
   const double size = body.sizes().maxCoeff();
   Vec3 low = body.min() - Vec3::Constant(walls * size), high = body.max() + Vec3::Constant(walls * size);
