@@ -1,4 +1,4 @@
-// What warping needs of a loaded body.
+// Data of a loaded body for warping.
 #pragma once
 
 #include "runtime/body/body.h"
@@ -6,10 +6,10 @@
 
 namespace palpate {
 
-/// The surface of a body all of whose stored nodes lie on it.
+/// Returns the surface of a body all of whose stored nodes lie on it.
 WarpSurface warp_surface(const Body& body);
 
-/// Its Green's functions. `body` must live as long.
+/// Returns its Green's functions. `body` must outlive the result.
 LinearResponse linear_response(const Body& body);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// How far a body may turn until its forces are wrong.
+// Range of rotation in which a body's forces are accurate.
 #pragma once
 
 #include <optional>
@@ -7,10 +7,9 @@
 
 namespace palpate {
 
-/// Rotation of the surface [rad] up to which forces were found to be within 5 % of a corotational body, for
-/// what `body` is: of small strain or warped. By the study in its file, without one by that of a cantilever
-/// that a force along its end bends (docs/measurements/live). Nothing for a live body, which turns as far as
-/// it likes.
+/// Rotation of the surface [rad] up to which forces are within 5 % of those of a corotational body, for the
+/// law of `body`: small strain or warped. Taken from the study in its file, or else from that of a cantilever
+/// bent by a force at its end (docs/measurements/live). Empty for a live body, whose rotation is not limited.
 std::optional<double> studied_rotation(const Body& body) noexcept;
 
 }  // namespace palpate

@@ -11,10 +11,10 @@ namespace palpate {
 namespace {
 
 constexpr double least_step = 0.005;    // [s]
-constexpr double bytes_a_second = 4e9;  // of Green's functions that a thread multiplies by
+constexpr double bytes_a_second = 4e9;  // Green's functions that a thread multiplies per second
 constexpr double rounds_a_step = 2.0;
 
-/// The rows and columns of some dofs.
+/// Returns the rows and columns of some degrees of freedom.
 template <class T>
 std::shared_ptr<const void> part_of(std::span<const T> packed, std::int64_t order,
                                     const std::vector<std::int64_t>& dofs) {

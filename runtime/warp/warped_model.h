@@ -1,13 +1,13 @@
-// A file's model as warping wants it.
+// Preparation of a model for warping.
 #pragma once
 
 #include "formats/model.h"
 
 namespace palpate {
 
-/// The model with the stored nodes of its surface alone, quasi-static, whose warp is found beside the tick
-/// every few milliseconds. Probes, overlays and dynamics are left out. Throws Error where Green's functions
-/// are compressed and hold nodes below the surface too, or there are none.
+/// Returns the model with the stored nodes of its surface alone, quasi-static; its warp is computed beside
+/// the tick every few milliseconds. Probes, overlays and dynamics are dropped. Throws Error if there are no
+/// Green's functions, or they are compressed and include nodes below the surface.
 Model warped_model(Model model);
 
 }  // namespace palpate
