@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-constexpr double surface_period = 1.0 / 30.0 - 1e-9;  // [s] rounding of ticks' times aside
+constexpr double surface_period = 1.0 / 30.0 - 1e-9;  // [s] less the rounding of the ticks' times
 constexpr auto quiet = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -19,7 +19,7 @@ void IgtlBroadcast::set_picture(DrawnPicture picture, Clock::time_point now) {
   hand_message_.reset();
   if (surface_ != nullptr && surface_->scene == newest_->scene) {
     const double since = newest_->picture.frame.time - surface_->picture.frame.time;
-    if (since >= 0.0 && since < surface_period) return;  // before: another run, whose time begins anew
+    if (since >= 0.0 && since < surface_period) return;  // negative: another run, whose time starts again
   }
   catch_up();
 }

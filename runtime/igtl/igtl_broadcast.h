@@ -1,4 +1,4 @@
-// What all OpenIGTLink clients are to be sent.
+// Content sent to all OpenIGTLink clients.
 #pragma once
 
 #include <chrono>
@@ -10,25 +10,25 @@
 
 namespace palpate {
 
-/// The newest picture, and the newest one whose surface is sent: 30 a second of the run's time at most.
-/// Messages are made when the first client wants them. Counts tell a client whether it has been sent what
-/// there is. For the server's thread.
+/// Latest picture, and the latest one whose surface is sent: at most 30 per second of the run's time.
+/// Messages are encoded when the first client needs them. Counters tell a client whether it has received the
+/// latest. For the server's thread.
 class IgtlBroadcast {
  public:
   using Clock = std::chrono::steady_clock;
   using Bytes = std::shared_ptr<const std::string>;
 
   void set_picture(DrawnPicture picture, Clock::time_point now);
-  /// Has the surface of the newest picture sent too where no other picture has come for a while: a run that
-  /// is paused or over is seen as it stands.
+  /// Sends the latest picture's surface too if no other picture has arrived for a while, so that a paused or
+  /// finished run is shown in its final state.
   void catch_up(Clock::time_point now);
-  /// That, at once.
+  /// Does so at once.
   void catch_up();
 
   [[nodiscard]] std::int64_t pictures() const noexcept { return pictures_; }
   [[nodiscard]] std::int64_t surfaces() const noexcept { return surfaces_; }
 
-  // Of what there is, see above.
+  // Messages of the current content.
   [[nodiscard]] const Bytes& surface_message();
   /// Tool and force.
   [[nodiscard]] const Bytes& hand_message();
@@ -36,7 +36,7 @@ class IgtlBroadcast {
  private:
   std::shared_ptr<const DrawnPicture> newest_;
   std::shared_ptr<const DrawnPicture> surface_;
-  Clock::time_point came_;  // the newest
+  Clock::time_point came_;  // time of the latest picture
   std::int64_t pictures_ = 0;
   std::int64_t surfaces_ = 0;
   Bytes surface_message_;

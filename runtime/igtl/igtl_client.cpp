@@ -16,14 +16,14 @@ using boost::system::error_code;
 
 constexpr auto pace_time = std::chrono::seconds(5);
 constexpr std::int64_t least_in_that = 80'000;   // [bytes]
-constexpr int send_room = 256 << 10;             // what waits in it is seen late [bytes]
-constexpr std::int64_t most_at_once = 64 << 10;  // handed to the system before that is counted [bytes]
+constexpr int send_room = 256 << 10;             // data waiting in it arrives late [bytes]
+constexpr std::int64_t most_at_once = 64 << 10;  // passed to the system before progress is measured [bytes]
 
 asio::const_buffer buffer_of(const IgtlBroadcast::Bytes& bytes) {
   return bytes ? asio::buffer(*bytes) : asio::const_buffer();
 }
 
-/// What the system still has of what it was handed, as the other machine has not taken it [bytes].
+/// Bytes that the system still holds because the other machine has not received them.
 std::int64_t left_in_system(int socket) {
   int bytes = 0;
   return ::ioctl(socket, SIOCOUTQ, &bytes) == 0 ? bytes : 0;
@@ -33,7 +33,7 @@ std::int64_t left_in_system(int socket) {
 
 IgtlClient::IgtlClient(asio::ip::tcp::socket socket, IgtlBroadcast& broadcast)
     : socket_(std::move(socket)), broadcast_(broadcast), way_{0, Clock::now()}, pace_(way_) {
-  error_code ignored;  // it does without
+  error_code ignored;  // not essential
   address_ = socket_.remote_endpoint(ignored).address();
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
   socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
@@ -79,7 +79,7 @@ void IgtlClient::read_some() {
 
 void IgtlClient::look(Clock::time_point now) {
   if (is_gone_) return;
-  const std::int64_t most = std::min(begun_, handed_ + most_at_once);  // that the system has been handed
+  const std::int64_t most = std::min(begun_, handed_ + most_at_once);  // passed to the system
   const std::int64_t taken = most - left_in_system(socket_.native_handle());
   if (taken >= way_.bytes) {
     way_ = {handed_, now};

@@ -1,4 +1,4 @@
-// A connection to an OpenIGTLink client.
+// Connection to an OpenIGTLink client.
 #pragma once
 
 #include <array>
@@ -12,31 +12,31 @@
 
 namespace palpate {
 
-/// Sends what is newest whenever what was sent before is gone: a client that is slow misses pictures. What
-/// the client says is read and thrown away, a little at a time. For the server's thread.
+/// Sends the latest content whenever the previous message is out: a slow client misses pictures. Input from
+/// the client is read and discarded, a little at a time. For the server's thread.
 class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
  public:
   using Clock = IgtlBroadcast::Clock;
 
-  /// `broadcast` must live as long.
+  /// `broadcast` must outlive this.
   IgtlClient(boost::asio::ip::tcp::socket socket, IgtlBroadcast& broadcast);
 
-  /// Sends what is new, unless something is on its way.
+  /// Sends new content unless a message is in progress.
   void send_news();
-  /// Throws away some of what the client has said. To be called again and again: how often bounds how much.
+  /// Discards some input of the client. Call it periodically: its rate bounds the amount.
   void read_some();
-  /// Looks how far it has come. To be called again and again, and before `is_lost` and `lag`: what it took
-  /// while this server did not run is seen only here.
+  /// Measures the progress of the data. Call it periodically, and before `is_lost` and `lag`: progress while
+  /// this server did not run is seen only here.
   void look(Clock::time_point now);
-  /// It has closed the connection, or took less than 16 kB/s in five seconds in which there was more for it.
+  /// True if it has closed the connection, or received less than 16 kB/s for five seconds with data pending.
   [[nodiscard]] bool is_lost() const noexcept { return is_gone_; }
-  /// How long something that the system was handed for it has been on its way, at least.
+  /// Minimum time for which data passed to the system has been in transit.
   [[nodiscard]] Clock::duration lag(Clock::time_point now) const noexcept { return now - way_.since; }
-  /// Where it is.
+  /// Address of the client.
   [[nodiscard]] const boost::asio::ip::address& address() const noexcept { return address_; }
-  /// It has been sent all there is.
+  /// True if it has been sent all content.
   [[nodiscard]] bool is_served() const;
-  /// No call comes back to it afterwards.
+  /// Closes the connection; no callback follows.
   void cut();
 
  private:
@@ -45,20 +45,20 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   boost::asio::ip::tcp::socket socket_;
   boost::asio::ip::address address_;
   IgtlBroadcast& broadcast_;
-  std::int64_t pictures_ = 0;  // sent, of those of the broadcast
+  std::int64_t pictures_ = 0;  // sent pictures, as counted by the broadcast
   std::int64_t surfaces_ = 0;
-  std::array<IgtlBroadcast::Bytes, 2> sending_;  // null: nothing
+  std::array<IgtlBroadcast::Bytes, 2> sending_;  // null: none
   bool is_sending_ = false;
   bool is_reading_ = false;
   bool is_gone_ = false;
-  // Of all bytes for it: sent or being sent, and handed to the system, as far as that has been told.
+  // Bytes for the client: sent or being sent, and passed to the system as far as known.
   std::int64_t begun_ = 0, handed_ = 0;
   struct Place {
     std::int64_t bytes = 0;
     Clock::time_point since;
   };
-  Place way_;   // what it is to take, and since when the system has had that
-  Place pace_;  // how far it was when its rate was looked at last, or when it had come so far
+  Place way_;   // bytes to be received next, and since when the system has had them
+  Place pace_;  // progress when its rate was last checked, or the time of reaching it
   std::array<char, 4096> said_{};
 };
 

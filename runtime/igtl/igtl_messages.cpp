@@ -17,7 +17,7 @@ namespace {
 
 constexpr double mm_per_m = 1e3;
 
-/// The bytes of a message that has its content.
+/// Packs a message and returns its bytes.
 std::string finish(igtl::MessageBase& message, const char* name, double time) {
   message.SetDeviceName(name);
   const double seconds = std::floor(time);
@@ -28,7 +28,7 @@ std::string finish(igtl::MessageBase& message, const char* name, double time) {
           static_cast<std::size_t>(message.GetPackSize())};
 }
 
-/// Cells of `corners` nodes.
+/// Returns cells of `corners` nodes.
 igtl::PolyDataCellArray::Pointer cell_array(std::span<const Index> nodes, std::size_t corners) {
   auto cells = igtl::PolyDataCellArray::New();
   std::array<igtlUint32, 3> cell{};
@@ -71,7 +71,7 @@ std::string igtl_surface(const DrawnPicture& drawn) {
   } else {
     message->SetLines(cell_array(mesh.cells, 2));
   }
-  std::vector<double> size;  // of the displacement
+  std::vector<double> size;  // magnitude of the displacement
   for (std::size_t k = 0; k < mesh.nodes.size(); ++k)
     size.push_back(mm_per_m * Eigen::Map<const Vec3>(mesh.displacement.data() + 3 * k).norm());
   add_scalars(*message, "displacement [mm]", size);

@@ -1,4 +1,4 @@
-// What is sent, as whole messages of OpenIGTLink, version 1 of its header.
+// Messages of OpenIGTLink, with version 1 of its header.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ constexpr const char* igtl_surface_name = "Palpate surface";
 constexpr const char* igtl_tool_name = "Palpate tool";
 constexpr const char* igtl_force_name = "Palpate force";
 
-// All have the time of the tick since the run began as their time stamp. Coordinates are those of the model,
-// in millimetres.
+// The time stamp of each message is the time of the tick since the start of the run. Coordinates are those of
+// the model, in millimetres.
 
-/// POLYDATA: what is seen of the body, as triangles or, without any, as lines; of each node the size of its
+/// POLYDATA: the visible surface as triangles or, without any, as lines; per node the magnitude of its
 /// displacement [mm], von Mises stress and contact pressure [Pa].
 std::string igtl_surface(const DrawnPicture& drawn);
 

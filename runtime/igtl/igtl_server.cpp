@@ -30,7 +30,7 @@ using boost::system::error_code;
 using Clock = IgtlBroadcast::Clock;
 
 constexpr auto tick_period = std::chrono::milliseconds(20);
-constexpr auto long_lag = std::chrono::milliseconds(500);  // for which a client gives way to another one
+constexpr auto long_lag = std::chrono::milliseconds(500);  // lag at which a client gives way to a new one
 constexpr auto farewell = std::chrono::milliseconds(500);
 constexpr int niceness = 5;
 
@@ -56,25 +56,25 @@ struct IgtlServer::Impl {
   void make_room(Clock::time_point now);
   [[nodiscard]] bool is_over(Clock::time_point now) const;
 
-  // What is shown, by any thread.
+  // Written by any thread.
   std::mutex mutex;
   PictureDrawing drawing;
   std::optional<DrawnPicture> mail;
 
-  // The thread's own.
+  // Used by the thread alone.
   asio::io_context context{1};
   tcp::acceptor acceptor;
   asio::steady_timer timer;
   IgtlBroadcast broadcast;
   std::vector<std::shared_ptr<IgtlClient>> clients;
   bool accept_failed = false;
-  std::optional<Clock::time_point> end;  // when it ends at the latest, once that is wanted
+  std::optional<Clock::time_point> end;  // latest time to end, once requested
   std::thread thread;
 };
 
 void IgtlServer::Impl::accept() {
   acceptor.async_accept([this](const error_code& problem, tcp::socket socket) {
-    accept_failed = problem.failed();  // no file is left for a connection: at the next tick there may be
+    accept_failed = problem.failed();  // out of file descriptors: retry at the next tick
     if (problem) return;
     const Clock::time_point now = Clock::now();
     drop_lost(now);  // the tick may be late
@@ -85,7 +85,7 @@ void IgtlServer::Impl::accept() {
   });
 }
 
-/// Lets clients say something, looks after those that are lost, and sends what was put off.
+/// Reads from clients, removes lost ones, and sends deferred content.
 void IgtlServer::Impl::tick() {
   timer.expires_after(tick_period);
   timer.async_wait([this](const error_code&) {
@@ -115,8 +115,8 @@ void IgtlServer::Impl::drop_lost(Clock::time_point now) {
   });
 }
 
-/// Cuts the client that is slowest to take what it is sent. Where none is slow, it is the newest before the
-/// last of the address that has most, so that nobody keeps the others out, and who has watched long stays.
+/// Closes the connection of the slowest client. If none is slow, closes the newest but one of the address
+/// with the most connections: one address cannot keep the others out, and clients connected for long stay.
 void IgtlServer::Impl::make_room(Clock::time_point now) {
   auto out = std::ranges::max_element(clients, {}, [now](const auto& client) { return client->lag(now); });
   if ((*out)->lag(now) < long_lag) {
@@ -125,7 +125,7 @@ void IgtlServer::Impl::make_room(Clock::time_point now) {
     };
     const auto newest_first = std::views::reverse(clients);
     const auto& most =
-        (*std::ranges::max_element(newest_first, {}, places))->address();  // a tie: the last one's
+        (*std::ranges::max_element(newest_first, {}, places))->address();  // in a tie, that of the last one
     const auto newest =
         std::ranges::find(newest_first.begin() + 1, newest_first.end(), most, &IgtlClient::address);
     out = newest == newest_first.end() ? std::prev(clients.end()) : std::prev(newest.base());
@@ -139,7 +139,7 @@ bool IgtlServer::Impl::is_over(Clock::time_point now) const {
 }
 
 void IgtlServer::Impl::work() {
-  // Its starter may be the loop's thread.
+  // It may have been started by the loop's thread.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   pthread_setname_np(pthread_self(), "igtl");
