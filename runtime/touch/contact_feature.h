@@ -1,4 +1,4 @@
-// The numbers by which a contact point is found again in the next tick.
+// Identifiers that match a contact point with the same one in the next tick.
 #pragma once
 
 #include <algorithm>
@@ -8,12 +8,12 @@
 
 namespace palpate {
 
-/// What of the surface a contact point is at.
+/// Kind of surface feature at a contact point.
 enum class FeatureKind : std::uint8_t { group, vertex, edge, face };
 
-/// From the highest bits: tool (0 to 511), place on the tool (0 to 15), kind, and twice 24 bits for the
-/// numbers of a group, a surface node, an edge's two or a simplex. The same place of the surface and the tool
-/// has the same number.
+/// Packs an identifier, from the highest bits: tool (0 to 511), place on the tool (0 to 15), kind, and twice
+/// 24 bits for the number of a group, a surface node or a simplex, or the two nodes of an edge. The same
+/// feature of the surface and place on the tool have the same identifier.
 constexpr std::int64_t contact_feature(Index tool, int place, FeatureKind kind, Index a,
                                        Index b = 0) noexcept {
   const std::int64_t head = (std::int64_t{tool} * 16 + place) * 4 + static_cast<int>(kind);
@@ -22,17 +22,17 @@ constexpr std::int64_t contact_feature(Index tool, int place, FeatureKind kind, 
   return (head << 48) + (std::int64_t{low} << 24) + high;
 }
 
-/// The kind of a feature.
+/// Returns the kind of a feature.
 constexpr FeatureKind kind_of(std::int64_t feature) noexcept {
   return static_cast<FeatureKind>((feature >> 48) & 3);
 }
 
-/// Whether two features are of the same kind and place on the same tool.
+/// True if two features have the same tool, place on it and kind.
 constexpr bool are_alike(std::int64_t a, std::int64_t b) noexcept {
   return a >> 48 == b >> 48;
 }
 
-/// The feature of the same tool and place with another kind and number.
+/// Returns the feature of the same tool and place with another kind and number.
 constexpr std::int64_t with_kind(std::int64_t feature, FeatureKind kind, Index number) noexcept {
   const std::int64_t head = (feature >> 48) / 4 * 4 + static_cast<int>(kind);
   return (head << 48) + number;

@@ -1,4 +1,4 @@
-// The surface nodes that a contact point acts on.
+// Surface nodes on which a contact point acts.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// Calls visit(surface node, weight) for each node that a contact point moves with; a group has to be in the
-/// near field.
+/// Calls visit(surface node, weight) for each node whose displacement moves the contact point. A group must
+/// be in the near field; otherwise there are no calls.
 template <class Visit>
 void for_each_node(const Body& body, const NearField& near, const ContactPoint& contact,
                    Visit&& visit) noexcept {

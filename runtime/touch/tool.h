@@ -1,4 +1,4 @@
-// What touches the body.
+// Rigid tools that touch the body.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,37 +10,37 @@
 
 namespace palpate {
 
-/// A rigid tool: all points within `radius` of its core, the segment of `length` from the tool's origin along
-/// its own z axis (in the plane: its own y axis), or a flat disc around the origin, normal to that axis, that
-/// makes the whole tool as wide as `disc_radius`. With neither it is a sphere, with radius 0 a point or a
-/// needle. It hangs on the device by a spring, the virtual coupling, which is in series with the body: what
-/// the hand feels is never stiffer than the coupling.
+/// Rigid tool: all points within `radius` of its core. The core is a segment of `length` from the tool's
+/// origin along its own z axis (in the plane: its own y axis), or a flat disc around the origin, normal to
+/// that axis, that gives the whole tool the radius `disc_radius`. With neither, the tool is a sphere, or with
+/// radius 0 a point or needle. A spring, the virtual coupling, connects it to the device in series with the
+/// body: the hand never feels more than its stiffness.
 struct Tool {
   double radius = 0.0;       ///< [m]
   double length = 0.0;       ///< [m]
-  double disc_radius = 0.0;  ///< of a disc with its edge, which is rounded by `radius`: at least that, and
-                             ///< the length is 0 [m]
+  double disc_radius = 0.0;  ///< radius of a disc including its edge, which is rounded by `radius`: at least
+                             ///< `radius`, with length 0 [m]
   double coupling_stiffness =
-      std::numeric_limits<double>::infinity();  ///< [N/m]; infinite: the tool is where the device is
+      std::numeric_limits<double>::infinity();  ///< [N/m]; infinite: the tool is at the device's position
   double coupling_torsion =
-      std::numeric_limits<double>::infinity();  ///< [N m/rad]; infinite: it is turned as the device is
-  double max_force = std::numeric_limits<double>::infinity();  ///< the largest that the hand is given [N]
-  double hand_over = 0.005;  ///< what of a force may change in a millisecond that the tool's motion does not
-                             ///< explain: infinite for the contact's own force without any smoothing [-]
-  double reach = 0.0;  ///< a grab that touches nothing holds the nearest surface within this distance of the
-                       ///< origin [m]
-  std::optional<double> friction{};  ///< Coulomb's coefficient, in place of the material's
+      std::numeric_limits<double>::infinity();  ///< [N m/rad]; infinite: the tool is oriented as the device
+  double max_force = std::numeric_limits<double>::infinity();  ///< largest force on the hand [N]
+  double hand_over = 0.005;  ///< fraction of the force that may change per millisecond without a matching
+                             ///< motion of the tool; infinite: the contact's own force, not smoothed [-]
+  double reach = 0.0;  ///< distance from the origin within which a grab without contact holds the nearest
+                       ///< surface [m]
+  std::optional<double> friction{};  ///< Coulomb coefficient, instead of the material's
 };
 
-/// Where the device wants the tool. On a body in the plane z is ignored, and so is what turns the tool out of
-/// it.
+/// Tool pose requested by the device. On a body in the plane, z and any rotation out of the plane are
+/// ignored.
 struct ToolPose {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  Vec3 position = Vec3::Zero();  ///< of the tool's origin [m]
-  bool grab = false;             ///< the tool wants to hold what it touches
+  Vec3 position = Vec3::Zero();  ///< position of the tool's origin [m]
+  bool grab = false;             ///< request to hold the touched surface
 };
 
-/// A force and its torque about the tool's origin.
+/// Force and its torque about the tool's origin.
 struct Wrench {
   Vec3 force = Vec3::Zero();   ///< [N]
   Vec3 torque = Vec3::Zero();  ///< [N m]; in the plane about z

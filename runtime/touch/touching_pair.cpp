@@ -41,7 +41,7 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes,
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
-/// The pair of a simplex with this normal.
+/// Pair of a simplex with this normal.
 TouchingPair pair_of(Index simplex, const Vec3& normal, int place, const NearestPoint& nearest) noexcept {
   const Vec3 across = nearest.on_core - nearest.on_simplex;
   return {.simplex = simplex,
@@ -52,7 +52,7 @@ TouchingPair pair_of(Index simplex, const Vec3& normal, int place, const Nearest
           .distance = across.norm()};
 }
 
-/// The pair of a simplex and the core of which these are the nearest points.
+/// Pair of a simplex and the core with these nearest points.
 TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
                        const NearestPoint& nearest) noexcept {
   return pair_of(simplex, outward_normal(tree, nodes), place, nearest);
@@ -152,7 +152,7 @@ TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, co
 std::size_t pairs_over_rim(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
                            std::size_t corner, const Core& core,
                            std::array<TouchingPair, 2>& pairs) noexcept {
-  // From the lower node, so that both triangles of an edge give a place the same number.
+  // From the lower node, so that both triangles of an edge number a place in the same way.
   std::size_t from = corner;
   std::size_t to = (corner + 1) % 3;
   if (nodes[from] > nodes[to]) std::swap(from, to);
