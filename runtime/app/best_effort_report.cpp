@@ -8,10 +8,10 @@
 namespace palpate {
 namespace {
 
-constexpr double grave_ticks = 0.001;  // of all
-constexpr double grave_error = 0.02;   // of the force
+constexpr double grave_ticks = 0.001;  // fraction of all ticks
+constexpr double grave_error = 0.02;   // fraction of the force
 
-/// A share that is 1 where it is more, too.
+/// Formats a fraction, which is 1 for all larger ones too.
 std::string percent(double share) {
   return share > 0.99 ? "100 % or more" : fmt::format("{:.2g} %", 100.0 * share);
 }

@@ -1,4 +1,4 @@
-// What is told of ticks whose force was a best effort.
+// Report on ticks whose force was a best effort.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,11 @@ namespace palpate {
 
 nlohmann::ordered_json to_json(const BestEffort& best_effort);
 
-/// How many, why, and how far off the force was; `ticks` of the whole run. Empty where there were none.
+/// Describes their number, the causes and the error of the force; `ticks`: ticks of the whole run. Empty if
+/// there were none.
 std::string in_words(const BestEffort& best_effort, std::int64_t ticks);
 
-/// Whether that is worth a warning: more than 0.1 % of the ticks, or an error of more than 2 % of the force.
+/// True if a warning is due: more than 0.1 % of the ticks, or an error of more than 2 % of the force.
 bool is_grave(const BestEffort& best_effort, std::int64_t ticks);
 
 }  // namespace palpate

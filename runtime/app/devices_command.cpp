@@ -25,7 +25,7 @@ void print_device(const AttachedDevice& device, const std::vector<NamedProfile>&
   for (const NamedProfile* profile : fitting) {
     say(stdout, "  profile  {}: {}\n", profile->key, profile->profile.name);
   }
-  // Nobody wants rules for the keyboard.
+  // A keyboard needs no rule.
   if (fitting.empty()) return;
   if (device.access == 0) {
     say(stdout, "  access   yes\n");

@@ -1,4 +1,4 @@
-// palpate-runtime devices: what is attached, and what can be played with.
+// palpate-runtime devices: attached devices and their profiles.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@ namespace palpate {
 
 struct DevicesOptions {
   bool json = false;
-  std::string profile;        ///< file of a profile beside the built-in ones; empty: none
+  std::string profile;        ///< additional profile file; empty: only the built-in ones
   std::string print_profile;  ///< name of a built-in profile to print instead; empty: list devices
 };
 
-/// Prints the HID devices, the profiles that fit them and why one cannot be opened. Returns the exit code;
-/// throws Error for profiles that are not there or wrong.
+/// Prints the HID devices, the profiles that fit them and the reason if one cannot be opened. Returns the
+/// exit code; throws Error for a missing or invalid profile.
 int devices(const DevicesOptions& options);
 
 }  // namespace palpate

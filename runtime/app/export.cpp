@@ -39,19 +39,19 @@
 namespace palpate {
 namespace {
 
-/// One in so many of a page's pictures is whole; from it the page makes those after it that it jumps to.
+/// Interval of complete pictures in a page; it seeks from the last complete one.
 constexpr std::size_t pictures_per_whole = 30;
 
-constexpr std::size_t most_page_bytes = std::size_t{1} << 29U;  // before it is packed
+constexpr std::size_t most_page_bytes = std::size_t{1} << 29U;  // before compression
 
-/// Pictures of a glTF scene: each is a morph target, and each has a weight at the time of each.
+/// Limit of pictures in a glTF scene: each is a morph target with a weight at the time of each picture.
 constexpr std::size_t most_targets = 1000;
-constexpr std::size_t most_scene_bytes = std::size_t{1} << 30U;  // the format itself ends at 4 GiB
+constexpr std::size_t most_scene_bytes = std::size_t{1} << 30U;  // the format ends at 4 GiB
 
 constexpr double usual_fps = 30.0;
-constexpr std::size_t table_block = 1 << 20;  // bytes that are written at once
+constexpr std::size_t table_block = 1 << 20;  // bytes written at a time
 
-/// Numbers of the pictures that are written, `fps` a second at most.
+/// Returns the numbers of the exported pictures, at most `fps` per second.
 std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOptions& options, double fps) {
   std::vector<std::int64_t> chosen;
   const double spacing = (1.0 - 1e-6) / fps;
@@ -73,7 +73,7 @@ void expect_some(const std::vector<std::int64_t>& chosen, const SessionPictures&
       fmt::format("it lasts from {:g} to {:g} s", pictures.time(0), pictures.time(pictures.frames() - 1)));
 }
 
-/// A recording's pictures that are written.
+/// Exported pictures of a recording.
 struct Chosen {
   SessionPictures& pictures;
   std::vector<std::int64_t> frames;
@@ -84,7 +84,7 @@ struct Chosen {
   [[nodiscard]] SurfacePicture picture(std::size_t k) const { return pictures.picture(frames[k]); }
 };
 
-/// What pages and scenes are too large for is asked for in parts.
+/// Refuses an export too large for its format, with a hint to export it in parts.
 [[noreturn]] void refuse(const std::string& what, const ExportOptions& options, const std::string& most) {
   throw Error(what, options.recording.string(),
               "ask for at most " + most + " by a lower --fps, or a part by --from and --to");
@@ -123,18 +123,18 @@ void tell(const std::filesystem::path& file, const Chosen& chosen, std::size_t b
       1e-6 * static_cast<double>(bytes));
 }
 
-/// "00042.vtu"
+/// File name of a frame: "00042.vtu".
 std::string frame_name(std::size_t number) {
   return fmt::format("{:05}.vtu", number);
 }
 
-/// The pictures of a series, in a folder beside the collection.
+/// Folder for the pictures of a series, beside the collection.
 std::filesystem::path frames_folder(const std::filesystem::path& pvd) {
   std::filesystem::path folder = pvd;
   return folder.replace_extension(".frames");
 }
 
-/// Throws Error where the folder is a file, or has files that an earlier series did not put there.
+/// Throws Error if the folder is a file, or has files that are not from an earlier series.
 void expect_only_frames(const std::filesystem::path& folder, bool force) {
   if (!std::filesystem::exists(folder)) return;
   if (!std::filesystem::is_directory(folder))
@@ -149,8 +149,8 @@ void expect_only_frames(const std::filesystem::path& folder, bool force) {
   }
 }
 
-/// The pictures, and the collection (.pvd) that lists them with their times. Returns the bytes of all
-/// pictures.
+/// Writes the pictures, and the collection (.pvd) that lists them with their times. Returns the total size of
+/// the pictures [byte].
 std::size_t write_series(const std::filesystem::path& pvd, const Chosen& chosen) {
   const std::filesystem::path folder = frames_folder(pvd);
   const Scene scene = chosen.pictures.scene();
@@ -171,15 +171,15 @@ std::size_t write_series(const std::filesystem::path& pvd, const Chosen& chosen)
                                  xml_escaped((folder.filename() / frame_name(k)).string())));
   }
   for (std::size_t k = chosen.frames.size(); std::filesystem::remove(folder / frame_name(k)); ++k) {
-  }  // of a longer series before
+  }  // left over from a longer series
   collection.write("</Collection>\n</VTKFile>\n");
   collection.finish();
   return bytes;
 }
 
-/// The ticks from options.from to options.to; there are some.
+/// Returns the ticks from options.from to options.to, at least one.
 TickRange choose_ticks(const RecordingFile& recording, const ExportOptions& options) {
-  const auto first_from = [&](auto&& is_before) {  // by halves
+  const auto first_from = [&](auto&& is_before) {  // by bisection
     std::int64_t low = 0, high = recording.ticks();
     while (low < high) {
       const std::int64_t middle = low + (high - low) / 2;
@@ -229,7 +229,7 @@ void write_scene(const Chosen& chosen, const ExportOptions& options, const std::
   tell(options.gltf, chosen, file.bytes());
 }
 
-/// Writes a row into a dataset for which there is space.
+/// Writes a row into an allocated dataset.
 template <class T>
 void fill(const Contents& file, const std::string& dataset, std::size_t rank, std::int64_t row,
           std::span<const T> values) {
@@ -246,8 +246,8 @@ void fill_frame(const Contents& file, std::int64_t row, const SurfaceFrame& fram
   fill<float>(file, "/frames/pressure", 2, row, frame.pressure);
 }
 
-/// Ticks and, where there are any, pictures, with their description. The HDF5 library, and what Debian's
-/// brings with it, is in a program of its own, which leaves space for the pictures.
+/// Writes ticks and, if there are any, pictures with their description. The HDF5 library and its dependencies
+/// are in a program of its own, which allocates the space for the pictures.
 void write_numbers(const RecordingFile& recording, SessionPictures* pictures, const ExportOptions& options,
                    const std::filesystem::path& hdf5) {
   const TickRange ticks = choose_ticks(recording, options);
@@ -274,7 +274,7 @@ void write_numbers(const RecordingFile& recording, SessionPictures* pictures, co
   }
   made.take_its_place();
   if (frames.empty()) {
-    std::filesystem::remove(xdmf_path(hdf5));  // of an earlier one
+    std::filesystem::remove(xdmf_path(hdf5));  // of an earlier export
   } else {
     write_xdmf(hdf5, recording.surface(), times);
   }

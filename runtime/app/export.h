@@ -1,4 +1,4 @@
-// palpate-runtime export: a recording for people and programs without Palpate.
+// palpate-runtime export: converts a recording for people and programs without Palpate.
 #pragma once
 
 #include <filesystem>
@@ -6,21 +6,21 @@
 
 namespace palpate {
 
-/// What of a recording is written, and where; files that are not asked for are empty.
+/// Outputs of an export; an empty path is not written.
 struct ExportOptions {
   std::filesystem::path recording;
-  std::filesystem::path html{};   ///< one page with the recording in it, which asks no network and no runtime
-  std::filesystem::path gltf{};   ///< the surface and the tool as an animation (glb_of)
+  std::filesystem::path html{};   ///< page that contains the recording and works without network and runtime
+  std::filesystem::path gltf{};   ///< animation of surface and tool (glb_of)
   std::filesystem::path vtu{};    ///< a collection (.pvd) of .vtu files in a folder beside it
-  std::filesystem::path csv{};    ///< the ticks (ticks_line)
+  std::filesystem::path csv{};    ///< ticks (ticks_line)
   std::filesystem::path hdf5{};   ///< ticks and pictures, with a description for ParaView beside it
-  std::optional<double> fps{};    ///< pictures a second at most; else 30, and all into HDF5
+  std::optional<double> fps{};    ///< most pictures per second; default 30, for HDF5 all
   double from = 0.0;              ///< [s]
-  std::optional<double> to = {};  ///< [s]; else to the end
-  bool force = false;             ///< outputs may take the place of any file that is not read
+  std::optional<double> to = {};  ///< [s]; default: the end
+  bool force = false;             ///< outputs may replace any file that is not an input
 };
 
-/// Writes what is asked for. Returns the exit code; throws Error.
+/// Writes the requested files. Returns the exit code; throws Error.
 int export_session(const ExportOptions& options);
 
 }  // namespace palpate

@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-constexpr double least_share = 0.03;  // of the body's diagonal
+constexpr double least_share = 0.03;  // fraction of the body's diagonal
 constexpr double most_share = 0.1;
 
 double diagonal(const Body& body) {

@@ -1,4 +1,4 @@
-// Which tools suit a body.
+// Tools that suit a body.
 #pragma once
 
 #include <string>
@@ -9,25 +9,25 @@
 
 namespace palpate {
 
-/// Radius of a ball that suits a body [m], to two digits: the mean edge of its surface, but no less than 3
-/// and no more than 10 % of the diagonal of its bounds.
+/// Returns the radius of a sphere that suits a body [m], to two digits: the mean edge of its surface, but at
+/// least 3 and at most 10 % of the diagonal of its bounds.
 [[nodiscard]] double fitting_radius(const Body& body);
 
-/// Why a tool is too large to feel a body with, for a person; empty where it is not. It is too large when it
-/// is longer than the body's `size`, the diagonal of its bounds [m].
+/// Returns a warning if the tool is too large for a body, that is, longer than `size`, the diagonal of its
+/// bounds [m]; empty otherwise.
 [[nodiscard]] std::string too_large(const Tool& tool, double size);
 
-/// Why a tool is too small for the body's mesh, for a person: by how much the mesh is too stiff where the
-/// tool is pressed in by a tenth of its radius, and by its radius (mesh_stiffening.h). Empty where the second
-/// is not noticed. A tool without a radius is always too small.
+/// Returns a warning if the tool is too small for the body's mesh: the stiffening by the mesh for a press of
+/// a tenth of the tool's radius, and that radius (mesh_stiffening.h). Empty if the stiffening is not
+/// noticeable. A tool without a radius is always too small.
 [[nodiscard]] std::string too_small(const Tool& tool, const Body& body);
 
-/// Prints what `too_small` gave, and what helps, on the error stream; nothing where it is empty.
+/// Prints the result of `too_small` with a hint to the error stream; nothing if it is empty.
 void tell_small_tool(const std::string& note);
 
-/// Where a person moves the tool (by a pointer or a device) and the settings name none: the ball that suits
-/// the body, told on the error stream. Scripts and replays without one have a point, so that what they do
-/// depends on no mesh. Warns of a tool that is too large.
+/// Chooses the sphere that suits the body, and reports it on the error stream, if a person moves the tool (by
+/// a pointer or a device) and the settings name no tool. Scripts and replays then use a point, so that their
+/// results do not depend on the mesh. Warns of a tool that is too large.
 void settle_tool(PlayOptions& options, const Body& body);
 
 }  // namespace palpate

@@ -23,10 +23,10 @@
 namespace palpate {
 namespace {
 
-constexpr double stiffer_than_surface = 50.0;  // the coupling of a mouse
+constexpr double stiffer_than_surface = 50.0;  // coupling of a mouse, relative to the surface
 
-/// Where the device's origin lies unless it is said: above the body, so that half of the workspace's radius
-/// takes the tool down to it.
+/// Default position of the device's origin: above the body, such that half of the workspace's radius moves
+/// the tool down to it.
 Vec3 place_above(const Body& body, const Tool& tool, double radius, double motion_scale) {
   constexpr double usual_radius = 0.1;  // m
   const double reach = motion_scale * (std::isfinite(radius) ? radius : usual_radius);
@@ -39,7 +39,7 @@ Vec3 place_above(const Body& body, const Tool& tool, double radius, double motio
 Settings settle_hand(Settings settings, const DeviceLimits& limits, const Body& body) {
   if (!settings.safety) {
     settings.safety.emplace();
-    // A body that swings gives energy back that nobody made.
+    // Free vibration returns energy that would look like activity.
     if (body.model().dynamics.method != DynamicsMethod::none) settings.safety->max_damping = 0.0;
   }
   *settings.safety = limited(*settings.safety, limits);
@@ -51,8 +51,8 @@ Settings settle_hand(Settings settings, const DeviceLimits& limits, const Body& 
   return settings;
 }
 
-/// A desktop stops a program for a while, and a pointer rests and jumps: none of it is a fault. Bodies may be
-/// of steel.
+/// Safety options for a run without a hand: the desktop suspends programs, and a pointer rests and jumps,
+/// none of which is a fault. Bodies may be as stiff as steel.
 SafetyOptions safety_without_hand() {
   constexpr double no_bound = 1e99;  // the rules multiply it
   SafetyOptions safety;
@@ -80,8 +80,8 @@ Settings settle_mouse(Settings settings, const Body& body) {
   return settings;
 }
 
-/// The port of `hid` or `bridge`; not open yet. Throws Error that says what there is and how to choose, when
-/// it is not clear which device is meant or it cannot be had.
+/// Returns the port for `hid` or `bridge`, not yet opened. Throws Error that lists the choices if the device
+/// is ambiguous or unavailable.
 std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice, const SafetyOptions& safety,
                                       Guardian* guardian) {
   if (choice.kind == DeviceChoice::Kind::bridge) {
@@ -152,7 +152,7 @@ void wait_for(const DeviceLink& link, bool is_bridge, const std::atomic<bool>& s
       say(stderr, "waiting for {}\n", link.name());
       told = true;
     }
-    // Something speaks, but not as it should.
+    // Input arrives, but is invalid.
     if (refusals.empty() && !(refusals = link.refusals()).empty()) print_warning("refused: " + refusals);
     if (!is_bridge && waited > 5s) {
       throw Error("it was opened but says nothing", link.name(),

@@ -1,4 +1,4 @@
-// What moves the tool of a run, and what it needs.
+// Input source of a run, and the settings that it needs.
 #pragma once
 
 #include <atomic>
@@ -15,35 +15,36 @@
 
 namespace palpate {
 
-/// What moves the tool.
+/// Input source: the device that moves the tool.
 struct InputSource {
   std::unique_ptr<Device> device;
-  DeviceLink* link = nullptr;      ///< the device, where a hand may be in it
-  MouseDevice* mouse = nullptr;    ///< the device, where it is a viewer's pointer
-  ReplayDevice* replay = nullptr;  ///< the device, where a session is replayed
-  std::int64_t ticks = std::numeric_limits<std::int32_t>::max();  ///< how long it goes on
+  DeviceLink* link = nullptr;                                     ///< the device, if it may be in a hand
+  MouseDevice* mouse = nullptr;                                   ///< the device, if it is a viewer's pointer
+  ReplayDevice* replay = nullptr;                                 ///< the device, if a session is replayed
+  std::int64_t ticks = std::numeric_limits<std::int32_t>::max();  ///< number of ticks until its end
 };
 
-/// Input sources of all kinds except the mouse, which begins above the body: see add_mouse. `guardian` may be
+/// Creates any input source except the mouse, which starts above the body: see add_mouse. `guardian` may be
 /// null. Throws Error.
 [[nodiscard]] InputSource make_input_source(const PlayOptions& options, Guardian* guardian);
 
-/// The mouse, lifted above the body.
+/// Adds the mouse, lifted above the body.
 void add_mouse(InputSource& input, const PlayOptions& options, const Body& body);
 
-/// Until the device says where it is, or `stop`. Throws Error when one that is plugged in stays silent.
+/// Waits until the device has reported its position, or `stop`. Throws Error if an attached device stays
+/// silent.
 void wait_for(const DeviceLink& link, bool is_bridge, const std::atomic<bool>& stop);
 
-/// What a hand needs beside what was asked for: safety, a place, and a coupling no stiffer than the device
-/// can show. No hand is in a mouse: all that its safety does is to notice that it is gone, and its coupling
-/// is fifty times stiffer than a node of the surface, that what is held gives no infinite force. Scripts and
-/// replays get what was asked for.
+/// Adds to the settings the needs of a hand: safety, an origin, and a coupling no stiffer than the device can
+/// show. A mouse is not held by a force: its safety only detects its loss, and its coupling is fifty times
+/// stiffer than a surface node, so that a grab gives no infinite force. Settings for scripts and replays are
+/// unchanged.
 [[nodiscard]] Settings apply_defaults(Settings settings, const InputSource& input, const Body& body);
 
-/// Where the device is and how strong.
+/// Prints the device's position and limits.
 void print_device(const InputSource& input, const Settings& settings);
 
-/// Median over some hundred nodes of the surface of 1 / mean diagonal of their block of Xi [N/m].
+/// Median over about a hundred surface nodes of 1 / mean diagonal of their block of Xi [N/m].
 [[nodiscard]] double surface_stiffness(const Body& body);
 
 }  // namespace palpate

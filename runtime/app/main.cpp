@@ -31,7 +31,7 @@ namespace {
 
 using namespace palpate;
 
-/// The arguments as they were written.
+/// Arguments as given on the command line.
 struct Arguments {
   std::string file;
   std::string model_toml;
@@ -141,7 +141,7 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
   return view;
 }
 
-/// CLI::PositiveNumber lets nan pass.
+/// CLI::PositiveNumber accepts nan.
 std::string check_number(const std::string& text) {
   return parse_number(text) ? "" : "'" + text + "' is not a finite number";
 }
@@ -192,7 +192,7 @@ std::vector<double> vector_argument(const std::string& option, const std::string
   return *vector;
 }
 
-/// Pairs the places with the displacements in the order in which they were written.
+/// Pairs places and displacements in the order of the command line.
 std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& arguments) {
   std::vector<ProbePlace> places;
   auto at = arguments.at.begin();
@@ -220,7 +220,7 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
 
 constexpr std::string_view commands = "push, play, view, probe, session, export or devices";
 
-/// Where the first word is no command, a hint of what was meant by it; else nothing.
+/// Returns a hint at the intended command if the first word is not one; otherwise empty.
 std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
   const std::string see = "See palpate-runtime --help";
@@ -250,7 +250,8 @@ int play_and_name_next(const PlayOptions& options) {
   return status;
 }
 
-/// Bakes what is not baked yet and plays it with a viewer. Wrong arguments are told before a minute's work.
+/// Bakes the file unless it is baked already, and plays it with a viewer. Wrong arguments are reported before
+/// the bake.
 int push(const PushArguments& arguments) {
   PlayArguments play_arguments;
   play_arguments.file = arguments.file;
@@ -271,7 +272,7 @@ int push(const PushArguments& arguments) {
   return play(options);
 }
 
-/// One or two recordings, or a folder.
+/// Views one or two recordings, or a folder.
 int view_files(const std::vector<std::filesystem::path>& files, const ViewerOptions& options) {
   if (files.empty()) return show_gallery(".", options);
   std::error_code problem;
@@ -280,7 +281,7 @@ int view_files(const std::vector<std::filesystem::path>& files, const ViewerOpti
   return view(files, options);
 }
 
-/// Settings and bounds of safety, with units and defaults apart from their meanings.
+/// Returns the tables of settings and safety bounds, with units and defaults separate from their meanings.
 nlohmann::ordered_json number_tables() {
   nlohmann::ordered_json settings = nlohmann::ordered_json::array(), safety = settings;
   for (const Setting& setting : settings_table()) {

@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 constexpr double follow_time = 0.015;  // s
-// Of a pointer that is let down: a browser that draws on a busy processor says nothing for seconds.
+// For a pressed pointer: a browser that draws on a busy processor may send nothing for seconds.
 constexpr std::int64_t most_silence = 5'000'000'000;  // ns
 
 }  // namespace
@@ -38,7 +38,7 @@ DeviceNews MouseDevice::poll(const TickTime& tick) noexcept {
   }
   const bool is_pressed = !word.pointer.lifted;
   const bool lost = is_pressed && (is_gone_ || tick.begun - heard_at_ > most_silence);
-  // It may have been lifted and let down since the last tick.
+  // It may have been lifted and pressed again since the last tick.
   const bool lands = lost || !is_pressed || word.lifts != heard_lifts_;
   heard_lifts_ = word.lifts;
   if (lands) {
@@ -65,7 +65,7 @@ void MouseDevice::land(const ToolPose& at) noexcept {
 }
 
 void MouseDevice::follow(const ToolPose& target) noexcept {
-  // The exact solution over one tick, for any period.
+  // Exact solution over one tick, for any period.
   const double decay = std::exp(-period_ / follow_time);
   const Vec3 away = state_.pose.position - target.position;
   const Vec3 drift = state_.velocity + away / follow_time;

@@ -1,4 +1,4 @@
-// A pointer on a screen in place of a hand.
+// Pointer on a screen in place of a haptic device.
 #pragma once
 
 #include <atomic>
@@ -10,20 +10,20 @@
 
 namespace palpate {
 
-/// Where a viewer's pointer wants the tool, some 60 times a second; the tool follows smoothly, as the second
-/// order low-pass x'' = w^2 (target - x) - 2 w x' (critically damped, w = 1 / 15 ms), so that steps of the
-/// pointer are no kicks. A button and a turn take effect at once. While it is lifted the tool is where the
-/// pointer is, holds nothing, and each tick is told so; let down, it follows from where it was lifted last.
-/// When the viewer is gone, or silent for five seconds, while the tool is let down, the input is lost: the
-/// tool is lifted, until the next word.
+/// Tool moved by a viewer's pointer, which sends about 60 poses per second. While pressed, the tool follows
+/// through a second-order low-pass x'' = w^2 (target - x) - 2 w x' (critically damped, w = 1 / 15 ms), so
+/// that steps of the pointer cause no kicks; buttons and rotations act at once. While lifted, the tool is at
+/// the pointer, holds nothing, and each tick gets the event; when pressed, it follows from where it was
+/// lifted last. If the viewer is gone, or silent for five seconds, while pressed, the input is lost: the tool
+/// is lifted until the next message.
 class MouseDevice : public Device {
  public:
-  /// `start`: where the tool is until a viewer says more; `rate`: ticks a second.
+  /// `start`: pose of the tool until the viewer's first message; `rate`: ticks per second.
   MouseDevice(const PointerPose& start, std::int64_t rate);
 
-  /// From the viewer's thread: the target. Never waits.
+  /// Sets the target, for the viewer's thread. Never waits.
   void point(const PointerPose& target) noexcept;
-  /// From the viewer's thread: it is gone.
+  /// Marks the viewer as gone, for the viewer's thread.
   void lose() noexcept { is_gone_ = true; }
 
   DeviceNews poll(const TickTime& tick) noexcept override;
@@ -32,23 +32,23 @@ class MouseDevice : public Device {
  private:
   struct Word {
     PointerPose pointer;
-    ToolPose landing;  // where it was lifted last
+    ToolPose landing;  // pose where it was lifted last
     std::int64_t number = 0;
-    std::int64_t lifts = 0;  // words so far in which it was lifted
+    std::int64_t lifts = 0;  // messages so far that lifted it
   };
 
   void land(const ToolPose& at) noexcept;
   void follow(const ToolPose& target) noexcept;
 
   Latest<Word> said_;
-  Word last_word_;  // of the viewer's thread
+  Word last_word_;  // used by the viewer's thread
   std::atomic<bool> is_gone_ = false;
 
-  // Of the loop's.
+  // Used by the loop.
   double period_;  // [s]
   DeviceState state_;
-  std::int64_t heard_ = 0;     // the last word
-  std::int64_t heard_at_ = 0;  // when [ns]
+  std::int64_t heard_ = 0;     // number of the last message
+  std::int64_t heard_at_ = 0;  // its time of arrival [ns]
   std::int64_t heard_lifts_ = 0;
   bool is_lost_ = false;
 };

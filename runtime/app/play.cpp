@@ -44,7 +44,7 @@ void warn_of_other_model(const RecordingFile& session, const Body& body) {
                 session.info().model_path + "): forces will differ");
 }
 
-/// Where the run may write, and puts that into the options, before anything else.
+/// Checks the outputs of the run and completes their names in the options, before anything else.
 OutputPaths check_outputs(PlayOptions& options) {
   using Kind = DeviceChoice::Kind;
   OutputPaths paths(options.force);
@@ -81,12 +81,12 @@ int exit_code(const LoopReport& report, bool recording_failed) {
 
 int play(PlayOptions options) {
   OutputPaths paths = check_outputs(options);
-  std::optional<Guardian> guardian;  // forks, so it comes before the first thread
+  std::optional<Guardian> guardian;  // forks, so it must precede the first thread
   if (options.device.kind == DeviceChoice::Kind::hid) guardian.emplace();
   stop_on_signals();
   block_acknowledging_signal();
   if (options.processor) leave_to_the_loop(*options.processor);
-  std::optional<SessionView> beside;  // first: a broken file is told even where the port is taken
+  std::optional<SessionView> beside;  // first: a broken file is reported even if the port is in use
   if (!options.beside.empty()) beside.emplace(options.beside);
   std::optional<ViewerPort> port;
   if (options.view) {

@@ -5,8 +5,8 @@
 
 namespace palpate {
 
-/// Runs to the end or to SIGINT, SIGTERM or SIGHUP, which leave a complete recording, report and table of
-/// contacts, and the device without force. With a viewer it goes on until then, unless there is a duration.
+/// Runs to the end or to SIGINT, SIGTERM or SIGHUP; recording, report and table of contacts are then
+/// complete, and the device has no force. With a viewer but without a duration it runs until a signal.
 /// Returns the exit code; throws Error.
 int play(PlayOptions options);
 

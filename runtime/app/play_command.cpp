@@ -111,7 +111,7 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
   play.add_flag("--force", arguments.force, force_help)->group(output_group);
 }
 
-/// What `read` gives; its Error is one of the arguments.
+/// Returns the result of `read`; its Error becomes one of the arguments.
 template <class Read>
 auto argument(Read&& read) {
   try {
@@ -121,7 +121,7 @@ auto argument(Read&& read) {
   }
 }
 
-/// The positive number that an option was given, nothing where it was not given.
+/// Parses the positive number of an option; empty if the option is not given.
 std::optional<double> positive_argument(const std::string& option, const std::optional<std::string>& text,
                                         const std::string& unit) {
   if (!text) return std::nullopt;
@@ -162,7 +162,7 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
                                  "bridge[:SOCKET] and, with --view, mouse");
 }
 
-/// What shows it, and what moves the tool then.
+/// Reads the options of viewer and pointer.
 void read_view(PlayArguments& arguments, PlayOptions& options) {
   if (arguments.view) options.view = read_viewer(arguments.viewer);
   const auto expect_view = [&](bool is_given, const char* option) {

@@ -1,4 +1,4 @@
-// The arguments of `palpate-runtime play`.
+// Arguments of `palpate-runtime play`.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// As they were written.
+/// Arguments as given on the command line.
 struct PlayArguments {
   std::string file;
   std::string model_toml;
@@ -37,20 +37,20 @@ constexpr const char* force_help =
 /// Adds the subcommand.
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
 
-/// What they mean. For a replay, what is not given is as it was in the session. Throws CLI::ParseError for
-/// wrong arguments, Error for a session that cannot be read.
+/// Converts arguments to options. For a replay, missing ones are taken from the session. Throws
+/// CLI::ParseError for invalid arguments, Error for a session that cannot be read.
 PlayOptions read_play(PlayArguments arguments);
 
-/// The place to listen at of an option, "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
+/// Parses an address to listen on, "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
 ListenAddress read_address(const std::string& text, const char* option);
 
 /// Adds the options of a viewer's page to `push`, `play` or `view`.
 void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const char* group = nullptr);
 
-/// What they mean. Throws CLI::ParseError.
+/// Converts viewer arguments to options. Throws CLI::ParseError.
 ViewerOptions read_viewer(const ViewerArguments& arguments);
 
-/// Overlay options of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
+/// Parses the overlay option of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
 OverlayOptions read_overlay(const std::string& text);
 
 }  // namespace palpate

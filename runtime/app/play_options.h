@@ -13,21 +13,21 @@
 
 namespace palpate {
 
-/// What moves the tool.
+/// Choice of the device that moves the tool.
 struct DeviceChoice {
   enum class Kind {
     script,  ///< a CSV file: `target`
-    replay,  ///< a session
-    hid,     ///< a HID device: `target` says which, empty where there is only one; `profile` how to treat it
-    bridge,  ///< another process, at the socket `target`; empty: at the usual one
-    mouse,   ///< the pointer of a viewer
+    replay,  ///< replay of a session
+    hid,     ///< HID device `target`, empty: the only one; `profile`: its profile
+    bridge,  ///< another process, at the socket `target`; empty: the default one
+    mouse,   ///< pointer of a viewer
   };
   Kind kind = Kind::script;
   std::string target;
   std::string profile;
-  std::string text;  ///< as it was written
+  std::string text;  ///< as given on the command line
 
-  /// Whether it is in the hand of a person, who waits for nobody.
+  /// True if a person moves it, which cannot be paused.
   [[nodiscard]] bool is_live() const noexcept {
     return kind == Kind::hid || kind == Kind::bridge || kind == Kind::mouse;
   }
@@ -35,23 +35,23 @@ struct DeviceChoice {
 
 struct PlayOptions {
   std::filesystem::path file;        ///< baked model
-  std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
+  std::filesystem::path model_toml;  ///< description that it must have been made from; empty: not checked
   DeviceChoice device;
-  std::shared_ptr<const RecordingFile> session;  ///< that is replayed
-  SettingsText settings_text;                    ///< as they were written, or are in the session
-  Settings settings;                             ///< what they mean
-  std::optional<double> duration;  ///< [s]; else to the end of the script or session, or until interrupted
-  std::optional<int> processor;    ///< that the loop is to have for itself
+  std::shared_ptr<const RecordingFile> session;  ///< session to replay
+  SettingsText settings_text;                    ///< settings as given, or as in the session
+  Settings settings;                             ///< the same, parsed
+  std::optional<double> duration;  ///< [s]; default: to the end of script or session, or until interrupted
+  std::optional<int> processor;    ///< processor reserved for the loop
   bool fast = false;
-  std::optional<ViewerOptions> view;  ///< where it is shown in a browser
-  std::optional<ListenAddress> igtl;  ///< where OpenIGTLink clients are sent it
-  std::filesystem::path beside;       ///< recording that the browser shows beside it; empty: none
-  std::filesystem::path record;       ///< empty: nothing is recorded
-  double record_frames = 60.0;        ///< of the surface a second; 0: none
-  std::filesystem::path report;       ///< JSON; "-": on the standard output; empty: none
+  std::optional<ViewerOptions> view;  ///< viewer in a browser
+  std::optional<ListenAddress> igtl;  ///< address for OpenIGTLink clients
+  std::filesystem::path beside;       ///< recording that the viewer shows beside it; empty: none
+  std::filesystem::path record;       ///< empty: no recording
+  double record_frames = 60.0;        ///< surface pictures per second; 0: none
+  std::filesystem::path report;       ///< JSON; "-": to the standard output; empty: none
   std::filesystem::path surface;      ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;     ///< CSV of the contact points after the last tick; empty: none
-  bool force = false;                 ///< these may take the place of any files that are not read
+  bool force = false;                 ///< outputs may replace any file that is not an input
 };
 
 }  // namespace palpate

@@ -31,7 +31,7 @@ double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
 }
 
-constexpr double most_patch_residual = 1e-3;  // that needs no word
+constexpr double most_patch_residual = 1e-3;  // largest one that is not reported
 
 void print_tangents(const PatchTangentTelling& telling) {
   say(stderr, "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), steps cut in half {} times\n",
@@ -102,7 +102,7 @@ void print_loop(const LoopReport& report, bool fast) {
   }
 }
 
-/// A force that is not the body's.
+/// Warns of a force that is not that of the body.
 void warn_of_rigid_contact(const PlayedRun& run) {
   const auto bit = std::find_if(status_names.begin(), status_names.end(),
                                 [](const auto& status) { return status.first == StepStatus::rigid_contact; });
@@ -115,7 +115,7 @@ void warn_of_rigid_contact(const PlayedRun& run) {
                                            "tool a --coupling, and a --max-force"));
 }
 
-/// Forces that are not quite the contact's.
+/// Reports forces that are not exactly the contact's.
 void tell_best_effort(const LoopReport& report) {
   const std::string words = in_words(report.best_effort, report.ticks);
   if (is_grave(report.best_effort, report.ticks)) {
@@ -166,7 +166,7 @@ std::string box_text(const Body& body) {
                      high.x(), high.y(), high.z());
 }
 
-/// What is wrong with where the tool was, so that nothing is felt.
+/// Warns of tool positions at which nothing is felt.
 void warn_of_places(const PlayedRun& run) {
   const LoopReport& report = run.report;
   const std::string place = "the body rests in " + box_text(run.body);
@@ -186,7 +186,7 @@ void warn_of_places(const PlayedRun& run) {
   }
 }
 
-/// How much of what has fixed room the tick has used at most.
+/// Returns the largest use of each fixed capacity of the tick.
 Json json_room(const State& state) {
   const HighWater& most = state.scratch.high_water;
   const auto entry = [](Index used, auto room) { return Json{{"most", used}, {"room", room}}; };
@@ -247,7 +247,7 @@ const WarpedMotion* warped_motion(const PlayedRun& run) {
 }
 
 constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
-constexpr double most_warp_residual = 1e-3;  // that needs no word
+constexpr double most_warp_residual = 1e-3;  // largest one that is not reported
 
 void print_warp(const WarpTelling& warp) {
   say(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
@@ -268,7 +268,7 @@ Json json_warp(const WarpTelling& warp) {
           {"last_residual", warp.last_residual}};
 }
 
-/// How far the tool's force was off at most, while the body moved or stood still [N].
+/// Largest error of the tool's force, whether the body moved or stood still [N].
 double largest_force_error(const LiveTelling& live, const LoopReport& report) {
   return std::max(live.largest_force_error, report.best_effort.largest_late_error);
 }
@@ -336,7 +336,7 @@ Json json_dynamics(const Body& body, const MotionSource* motion) {
   return json;
 }
 
-/// How often each class of durations came: [upper end in ns, count], each twice as long as the one before.
+/// Counts of durations by class: [upper end in ns, count], each class twice as long as the one before.
 Json json_histogram(const TimeHistogram& histogram) {
   Json json = Json::array();
   std::int64_t from = 0;
@@ -361,7 +361,7 @@ Json json_safety(const LoopReport& report) {
   return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
 }
 
-/// Against the mesh, after the last tick.
+/// Change of the surface relative to the mesh, after the last tick.
 SurfaceChange last_change(const PlayedRun& run) {
   const Body& body = run.body;
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));

@@ -1,4 +1,4 @@
-// What is told of a run when it is over.
+// Report of a run at its end.
 #pragma once
 
 #include <optional>
@@ -12,27 +12,27 @@
 
 namespace palpate {
 
-/// A run and its parts; the pointers may be null.
+/// Run and its parts; the pointers may be null.
 struct PlayedRun {
   const PlayOptions& options;
-  const Settings& settings;  ///< as they were in the end
+  const Settings& settings;  ///< settings at the end
   const Body& body;
   const Tool& tool;
   const State& state;                  ///< after the last tick
-  const LoopReport& report;            ///< of all of it
-  const PlayedParts* parts = nullptr;  ///< where it may have been begun anew; the state is the last one's
+  const LoopReport& report;            ///< of the whole run
+  const PlayedParts* parts = nullptr;  ///< if it may have been restarted; the state is the last session's
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;
-  std::int64_t dropped = 0;                     ///< ticks that the recording lacks
-  std::int64_t dropped_frames = 0;              ///< and frames
-  std::optional<Error> recording_failure = {};  ///< why it is not whole
+  std::int64_t dropped = 0;                     ///< ticks missing from the recording
+  std::int64_t dropped_frames = 0;              ///< frames missing from it
+  std::optional<Error> recording_failure = {};  ///< reason if the recording is incomplete
 };
 
-/// A few lines for a person, and warnings, on the error stream.
+/// Prints a few lines for a person, and warnings, to the error stream.
 void print_report(const PlayedRun& run);
 
-/// All of it for programs.
+/// Returns the complete report for programs.
 std::string json_report(const PlayedRun& run);
 
 }  // namespace palpate

@@ -117,7 +117,7 @@ const LoopReport& PlaySession::run(const std::atomic<bool>& stop) {
   monitor_.reset();
   feed_.reset();
   viewed_.reset();
-  frames_.reset();  // the last frame is in the recording
+  frames_.reset();  // waits until the last frame is in the recording
   if (recorder_) finish_recording();
   if (input_.replay != nullptr) input_.replay->check();
   return report_;
@@ -131,7 +131,7 @@ void PlaySession::finish_recording() {
   }
 }
 
-/// The loop with the rights it needs, which the threads that were started before do not inherit.
+/// Runs the loop with its real-time rights, which threads started earlier do not inherit.
 LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   const auto pointer = [](auto& part) { return part ? &*part : nullptr; };
   const LoopParts parts = {.body = body_,
@@ -190,7 +190,7 @@ void PlaySession::tell(const PlayedParts* parts) const {
   attempt(options_.surface, [&](const auto& file) { write_surface(file, body_, state_); });
   attempt(options_.report, [&](const auto& file) {
     if (file == standard_output) {
-      std::fputs(json_report(played).c_str(), stdout);  // main sees whether it arrived
+      std::fputs(json_report(played).c_str(), stdout);  // main checks whether it was written
     } else {
       write_file(file, json_report(played));
     }

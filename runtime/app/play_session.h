@@ -1,4 +1,4 @@
-// One run of the loop, from the untouched body to its report.
+// Single run of the loop, from the untouched body to its report.
 #pragma once
 
 #include <atomic>
@@ -16,10 +16,10 @@
 
 namespace palpate {
 
-/// The name of a report that goes to the standard output.
+/// Name of a report to the standard output.
 constexpr const char* standard_output = "-";
 
-/// Who looks on, and may steer it. Without a viewer nothing is set.
+/// Viewer of a session, which may control it; all empty without a viewer.
 struct SessionViewer {
   LoopControl* control = nullptr;
   TickFeed::Sink ticks;
@@ -27,35 +27,35 @@ struct SessionViewer {
   Recorder::OnFailure recording_failed;
 };
 
-/// Everything that works beside the loop in one run: overlays, motion, recording, frames, monitor.
+/// Loop and all that works beside it in one run: overlays, motion, recording, frames, monitor.
 class PlaySession {
  public:
-  /// `options` of this session, with defaults applied for `input`; `body` and `input`
-  /// must live as long. Throws Error.
+  /// `options` of this session, with defaults applied for `input`; `body` and `input` must outlive this.
+  /// Throws Error.
   PlaySession(PlayOptions options, const Body& body, const InputSource& input,
               const SessionViewer& viewer = {});
   PlaySession(const PlaySession&) = delete;
   PlaySession& operator=(const PlaySession&) = delete;
 
-  /// Begins with a fault that was latched before and that nobody has acknowledged yet. Before `run`.
+  /// Latches a fault of an earlier session that is not yet acknowledged. Call before `run`.
   void latch(Fault fault) noexcept {
     if (safety_) safety_->fail(fault);
   }
-  /// What is latched, none without safety rules. Not during `run`.
+  /// Latched fault; none without safety rules. Must not be called during `run`.
   [[nodiscard]] Fault fault() const noexcept { return safety_ ? safety_->fault() : Fault::none; }
 
-  /// To the end, to `stop` or until the viewer's control says `leave`. What was recorded has its index
-  /// then, unless that failed.
+  /// Runs to the end, to `stop` or until the viewer's control requests `leave`. The recording then has its
+  /// index, unless it failed.
   const LoopReport& run(const std::atomic<bool>& stop);
 
-  /// Why the recording of the run that is over is not whole; nothing where it is, or there is none.
+  /// Reason if the recording of the finished run is incomplete; empty if it is complete, or there is none.
   [[nodiscard]] const std::optional<Error>& recording_failure() const noexcept { return recording_failure_; }
 
-  /// Ticks that the recording lacks.
+  /// Number of ticks missing from the recording.
   [[nodiscard]] std::int64_t dropped() const { return recorder_ ? recorder_->dropped() : 0; }
 
-  /// The report, and the files that the options ask for. `parts`: of the run that this session was the last
-  /// one of. Throws Error for the first that cannot be written, after all others are.
+  /// Writes the report and the files requested by the options. `parts`: all sessions of the run of which this
+  /// is the last. Throws Error for the first that cannot be written, after writing all others.
   void tell(const PlayedParts* parts = nullptr) const;
 
  private:

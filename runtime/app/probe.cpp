@@ -20,17 +20,17 @@
 namespace palpate {
 namespace {
 
-/// What is told of one node.
+/// Result for one node.
 struct Answer {
-  Index node = -1;                   // of the mesh
+  Index node = -1;                   // mesh node
   Index stored = -1;                 // stored node
   Vec3 position = Vec3::Zero();      // at rest [m]
-  std::optional<double> distance;    // from the point asked for [m]
+  std::optional<double> distance;    // from the requested point [m]
   Vec3 displacement = Vec3::Zero();  // relative to rest [m]
   Vec3 force = Vec3::Zero();         // on the body [N]
 };
 
-/// A vector as it was written, in the space that the body moves in.
+/// Converts a vector as given to the dimension of the body.
 Vec3 vector_of(const std::vector<double>& numbers, const Body& body, const std::string& option,
                const std::string& where) {
   const bool has_z = numbers.size() == 3;
@@ -47,7 +47,7 @@ Vec3 vector_of(const std::vector<double>& numbers, const Body& body, const std::
   return {numbers[0], numbers[1], has_z ? numbers[2] : 0.0};
 }
 
-/// "x and z": the axes whose bits are set.
+/// Names of the axes whose bits are set: "x and z".
 std::string axes_text(unsigned axes) {
   std::vector<std::string> names;
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -56,7 +56,7 @@ std::string axes_text(unsigned axes) {
   return fmt::format("{}", fmt::join(names, " and "));
 }
 
-/// The stored node that is meant by a node of the mesh.
+/// Returns the stored node of a mesh node.
 Index stored_node_of(const Body& body, Index node, const std::string& where) {
   const Model& model = body.model();
   if (node >= static_cast<Index>(model.mesh.nodes.size())) {
@@ -82,7 +82,7 @@ Index stored_node_of(const Body& body, Index node, const std::string& where) {
               "give a surface node, or precompute with storage scope \"full\" or more layers");
 }
 
-/// The nodes that are meant, and what is asked for there; forces come later.
+/// Returns the requested nodes and displacements; forces are added later.
 std::vector<Answer> read_questions(const Body& body, const ProbeOptions& options) {
   const std::string where = options.file.string();
   std::vector<Answer> answers;
@@ -109,7 +109,7 @@ std::vector<Answer> read_questions(const Body& body, const ProbeOptions& options
   return answers;
 }
 
-/// What was likely not meant, a sentence each.
+/// Returns warnings about likely mistakes, a sentence each.
 std::vector<std::string> warnings_of(const Body& body, const std::vector<Answer>& answers) {
   const double edge = body.longest_surface_edge();
   const double size = body.bounds().diagonal().norm();
@@ -134,7 +134,7 @@ std::vector<std::string> warnings_of(const Body& body, const std::vector<Answer>
   return warnings;
 }
 
-/// A finer mesh over the elements round all nodes that are asked for.
+/// Returns a finer mesh over the elements around all requested nodes.
 Overlay make_overlay(const Body& body, const std::vector<Answer>& answers, const OverlayOptions& options) {
   const Model& model = body.model();
   const ElementsAtNodes at(model.mesh);

@@ -20,20 +20,20 @@
 namespace palpate {
 namespace {
 
-/// A node of the body or of an overlay's fine mesh.
+/// Node of the body or of an overlay's fine mesh.
 struct FieldNode {
-  Index node;  // of the body, -1 where it has none
-  Vec3 x;      // in the mesh [m]
+  Index node;  // body node, -1 if there is none
+  Vec3 x;      // position in the mesh [m]
   Vec3 u0;     // displacement at rest [m]
-  Vec3 u;      // by the probe, from rest [m]
+  Vec3 u;      // displacement from rest by the probe [m]
   Stress stress = Stress::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 
-/// What a probe has found of the body.
+/// Displacement and stress of a probed body.
 struct Probed {
   const Body& body;
   std::span<const double> u;            // [n]
-  std::map<Index, Stress> stress = {};  // by node of the mesh
+  std::map<Index, Stress> stress = {};  // per mesh node
 
   [[nodiscard]] FieldNode node(Index node) const {
     const Model& model = body.model();
@@ -45,7 +45,7 @@ struct Probed {
     return result;
   }
 
-  /// Finds the stress on the surface by its displacement and the forces [n] on it [N].
+  /// Computes the stress on the surface from its displacement and the forces [n] on it [N].
   void find_stress(std::span<const double> force) {
     const std::span<const Index> nodes = body.surface_mesh_nodes();
     std::vector<Vec3> moved, pushed;
@@ -61,7 +61,7 @@ struct Probed {
   }
 };
 
-/// The nodes of the fine mesh, those that the body has too among them: u = u_G + u_L.
+/// Returns the nodes of the fine mesh, including those of the body: u = u_G + u_L.
 std::vector<FieldNode> fine_nodes(const Body& body, const Overlay& overlay, std::span<const double> u) {
   const PatchMesh& patch = overlay.patch();
   const auto d = static_cast<std::size_t>(body.dimension());
@@ -86,7 +86,7 @@ std::vector<FieldNode> fine_nodes(const Body& body, const Overlay& overlay, std:
   return nodes;
 }
 
-/// A row a stored node, and then a row a node that only the fine mesh has.
+/// Writes a row per stored node, then a row per node of the fine mesh alone.
 void write_csv(const std::filesystem::path& file, const Probed& probed, const Overlay* overlay) {
   const Body& body = probed.body;
   std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz,sxx,syy,szz,sxy,syz,szx,von_mises\n";
@@ -110,8 +110,8 @@ struct Cells {
   std::vector<Index> connectivity;
 };
 
-/// The fine mesh's cells in place of those that are of the patch's elements. Of its nodes those that the body
-/// has not are numbered after the body's.
+/// Replaces the cells of the patch's elements by those of the fine mesh. Nodes of the fine mesh alone are
+/// numbered after the body's.
 void lay_over(Cells& cells, const Body& body, const PatchMesh& patch) {
   const Mesh& mesh = body.model().mesh;
   const bool whole = cells.element == mesh.element;
@@ -132,7 +132,7 @@ void lay_over(Cells& cells, const Body& body, const PatchMesh& patch) {
   cells.connectivity = std::move(result);
 }
 
-/// The whole mesh where every node of it is stored or held, else its surface.
+/// Returns the whole mesh if all its nodes are stored or held, otherwise its surface.
 Cells shown_cells(const Body& body) {
   const Model& model = body.model();
   bool whole = true;
@@ -143,7 +143,7 @@ Cells shown_cells(const Body& body) {
   return {body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, model.surface};
 }
 
-/// Drops the nodes that no cell has: returns which are left.
+/// Drops the nodes without a cell; returns the remaining ones.
 std::vector<std::size_t> keep_used_nodes(Cells& cells, std::size_t nodes) {
   std::vector<Index> number(nodes, -1);
   for (const Index node : cells.connectivity) number[static_cast<std::size_t>(node)] = 0;
@@ -157,8 +157,8 @@ std::vector<std::size_t> keep_used_nodes(Cells& cells, std::size_t nodes) {
   return kept;
 }
 
-/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are not stored are
-/// held along every axis and shown at rest.
+/// Writes a grid of the undeformed body with u0 and the visible displacement u0 + u. Nodes that are not
+/// stored are held along every axis and shown at rest.
 void write_grid(const std::filesystem::path& file, const Probed& probed, const Overlay* overlay) {
   const Body& body = probed.body;
   const auto body_nodes = static_cast<Index>(body.model().mesh.nodes.size());

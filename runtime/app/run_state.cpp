@@ -30,7 +30,7 @@ nlohmann::json vector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// The name of a numbered constant.
+/// Returns the name of a numbered constant.
 template <class Names>
 std::string_view name_of(const Names& names, std::size_t number) {
   return names[std::min(number, names.size() - 1)].second;
@@ -52,7 +52,7 @@ bool has_loads(const Model& model) {
          std::any_of(model.rest_force.begin(), model.rest_force.end(), is_there);
 }
 
-/// Young's moduli of the materials, in the order of their numbers [Pa].
+/// Returns Young's moduli of the materials, in the order of their numbers [Pa].
 nlohmann::json youngs_moduli(const Model& model) {
   nlohmann::json moduli = nlohmann::json::array();
   for (const Material& material : model.materials) moduli.push_back(material.youngs_modulus);
@@ -106,8 +106,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
 }
 
 nlohmann::json describe_defaults(const Body& body) {
-  constexpr double share = 0.05;           // of the body's diagonal
-  constexpr double share_of_least = 0.25;  // of its least extent
+  constexpr double share = 0.05;           // fraction of the body's diagonal
+  constexpr double share_of_least = 0.25;  // fraction of its smallest extent
   const Vec3 extent = body.bounds().max() - body.bounds().min();
   const double least = body.dimension() == 2 ? std::min(extent.x(), extent.y()) : extent.minCoeff();
   return {{"radius", fitting_radius(body)},

@@ -1,4 +1,4 @@
-// What a viewer's page is told of a run beside its pictures.
+// State of a run as sent to a viewer's page, beside its pictures.
 #pragma once
 
 #include <cstdint>
@@ -14,36 +14,36 @@
 
 namespace palpate {
 
-/// The run's members of the message `state` (web/PROTOCOL.md).
+/// Members of the message `state` that belong to the run (web/PROTOCOL.md).
 struct RunState {
   std::uint32_t scene = 0;
-  nlohmann::json model;     ///< of describe_model
-  nlohmann::json defaults;  ///< of describe_defaults
-  std::string device;       ///< what moves the tool
-  bool pointer = false;     ///< it is a page's pointer
-  bool hand = false;        ///< a hand is in it, whose safety is not a page's to change
+  nlohmann::json model;     ///< from describe_model
+  nlohmann::json defaults;  ///< from describe_defaults
+  std::string device;       ///< name of the device that moves the tool
+  bool pointer = false;     ///< the device is a page's pointer
+  bool hand = false;        ///< the device is in a hand, so a page must not change safety
   std::int64_t rate = 1000;
-  std::int64_t ticks = 0;   ///< since the session began
-  std::int64_t misses = 0;  ///< of deadlines
+  std::int64_t ticks = 0;   ///< since the start of the session
+  std::int64_t misses = 0;  ///< missed deadlines
   bool paused = false;
   std::optional<std::string> recording;   ///< file
-  std::optional<Error> recording_failed;  ///< why nothing is kept in it any more
-  std::optional<std::string> busy;        ///< what is being made
-  std::optional<Error> refused;           ///< why the last request could not be met
-  std::optional<std::string> locked;      ///< why settings cannot be changed
+  std::optional<Error> recording_failed;  ///< reason if recording has failed
+  std::optional<std::string> busy;        ///< work in progress, for example loading
+  std::optional<Error> refused;           ///< reason for refusing the last request
+  std::optional<std::string> locked;      ///< reason if settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
-  std::optional<SurfaceChange> change{};  ///< of the surface that was shown half a second ago, or less
+  std::optional<SurfaceChange> change{};  ///< change of the surface shown at most half a second ago
   SettingsText settings;
-  std::string tool_note;  ///< of too_small (fitting_tool.h); empty where the tool is not
+  std::string tool_note;  ///< from too_small (fitting_tool.h); empty if the tool is large enough
 };
 
 [[nodiscard]] nlohmann::json to_json(const RunState& state);
 
-/// Name, file, size and kind of a model.
+/// Returns name, file, size and kind of a model.
 [[nodiscard]] nlohmann::json describe_model(const Body& body, const std::string& file);
 
-/// What suits it: radius of a tool, reach of a grab, friction, and how deep to press.
+/// Returns suitable values: radius of a tool, reach of a grab, friction, and depth of a press.
 [[nodiscard]] nlohmann::json describe_defaults(const Body& body);
 
 }  // namespace palpate

@@ -24,18 +24,18 @@ const std::string header_hint =
 constexpr std::array<std::string_view, 9> script_columns = {"t",  "x",  "y",  "z",   "qw",
                                                             "qx", "qy", "qz", "grab"};
 constexpr std::size_t place_columns = 4, first_turn_column = 4,
-                      grab_column = 8;  // how many, and where others begin
+                      grab_column = 8;  // number of columns, and first columns of the optional ones
 
-/// Where a table has the columns that are known; else nothing.
+/// Positions of the known columns in a table; an absent one is empty.
 struct Columns {
   char separator = ',';
   std::array<std::optional<std::size_t>, script_columns.size()> places{};
   std::size_t count = 0;
   std::vector<std::string> unread{};
-  std::string twice{};  // a name, else empty
+  std::string twice{};  // name of a duplicate column; empty if none
 };
 
-/// Takes the next line off the front of `text`.
+/// Removes the next line from the front of `text`.
 std::string_view next_line(std::string_view& text) {
   const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
   const std::string_view line = text.substr(0, end);
@@ -43,7 +43,8 @@ std::string_view next_line(std::string_view& text) {
   return line;
 }
 
-/// The fields of a line, without spaces and quotes round them; a separator ' ' is any number of blanks.
+/// Returns the fields of a line, without surrounding spaces and quotes; the separator ' ' is any number of
+/// blanks.
 std::vector<std::string> split_fields(std::string_view line, char separator) {
   std::vector<std::string> fields(1);
   char quote = '\0';
@@ -76,7 +77,7 @@ char separator_of(std::string_view header) {
   return ' ';
 }
 
-/// The columns by their names, in any order and case.
+/// Returns the columns by name, in any order and case.
 Columns read_header(std::string_view line) {
   Columns columns{.separator = separator_of(line)};
   for (std::string& name : split_fields(line, columns.separator)) {
@@ -96,8 +97,7 @@ Columns read_header(std::string_view line) {
   return columns;
 }
 
-/// Columns that are missing: of those that a script always has and, where one of them is there, of a
-/// quaternion.
+/// Returns the missing columns: required ones and, if any part of a quaternion is present, the rest of it.
 std::string missing_columns(const Columns& columns) {
   const auto there = [&](std::size_t place) { return columns.places[place].has_value(); };
   const bool turns = there(4) || there(5) || there(6) || there(7);
@@ -107,7 +107,7 @@ std::string missing_columns(const Columns& columns) {
   return names;
 }
 
-/// A number with a decimal point or, where no commas separate fields, a decimal comma.
+/// Parses a number with a decimal point or, unless commas separate fields, a decimal comma.
 double read_number(std::string text, const std::string& where) {
   std::string with_point = text;
   if (with_point.find('.') == std::string::npos) std::replace(with_point.begin(), with_point.end(), ',', '.');
@@ -116,7 +116,7 @@ double read_number(std::string text, const std::string& where) {
   return *number;
 }
 
-/// The rotation by a quaternion w, x, y, z of any length but 0.
+/// Returns the rotation of a quaternion w, x, y, z of any length except 0.
 Eigen::Quaterniond read_orientation(std::span<const double, 4> q, const std::string& where) {
   Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
   const double largest = orientation.coeffs().cwiseAbs().maxCoeff();
@@ -128,7 +128,7 @@ Eigen::Quaterniond read_orientation(std::span<const double, 4> q, const std::str
   return orientation.normalized();
 }
 
-/// What a row has in the columns that are known; 0 where they are not there.
+/// Returns the values of a row in the known columns; 0 for absent ones.
 std::array<double, script_columns.size()> read_row(std::string_view line, const Columns& columns,
                                                    const std::string& where) {
   std::vector<std::string> fields = split_fields(line, columns.separator);
@@ -156,8 +156,8 @@ ToolPose read_pose(std::span<const double, script_columns.size()> values, const 
   return pose;
 }
 
-/// Lines that loggers and spreadsheets write beside the table. A comment that names the columns is its
-/// header.
+/// True for lines that loggers and spreadsheets write beside the table. A comment that names the columns is
+/// the header.
 bool is_comment(std::string_view line, bool has_header) {
   if (line.starts_with("sep=")) return true;
   if (line.front() != '#') return false;
@@ -226,7 +226,7 @@ ToolPose ScriptDevice::pose(double t) const noexcept {
 }
 
 std::int64_t ScriptDevice::ticks() const noexcept {
-  constexpr double rounding = 1e-6;  // of a tick: 0.003 s is tick 3 although 0.003 * 1000 is not 3
+  constexpr double rounding = 1e-6;  // fraction of a tick: 0.003 s is tick 3 although 0.003 * 1000 is not 3
   return static_cast<std::int64_t>(std::floor(end_time() * static_cast<double>(rate_) + rounding)) + 1;
 }
 

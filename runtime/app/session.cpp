@@ -36,7 +36,7 @@ std::string fault_name(Fault fault) {
   return fmt::format("fault {}", static_cast<int>(fault));
 }
 
-/// "a=1\nb=2\n" as "a=1, b=2".
+/// Formats "a=1\nb=2\n" as "a=1, b=2".
 std::string in_one_line(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
   for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at))
@@ -61,7 +61,7 @@ std::string status_text(const SessionSummary& summary) {
   return text.empty() ? "none" : text;
 }
 
-/// How it ended.
+/// End of a recording.
 enum class Ending { finished, killed, finished_now, going_on };
 
 constexpr std::string_view ending_names[] = {"finished", "killed: --finish adds its index",

@@ -62,14 +62,14 @@ std::vector<double> SessionPictures::times() const {
   return times;
 }
 
-/// The tick with this number, or the last one before it; nothing where there is none.
+/// Returns the tick with this number, or the last one before it; empty if there is none.
 std::optional<TickRecord> SessionPictures::tick(std::int64_t number) const {
   const std::int64_t rate = file_.info().rate;
-  std::int64_t row = std::min(number, file_.ticks() - 1);  // where none is missing
+  std::int64_t row = std::min(number, file_.ticks() - 1);  // if no tick is missing
   if (row < 0) return std::nullopt;
   TickRecord found = file_.tick(row);
   if (number_of(found, rate) <= number) return found;
-  std::int64_t end = row;  // behind the one that is wanted
+  std::int64_t end = row;  // after the wanted one
   for (row = -1; end - row > 1;) {
     const std::int64_t middle = row + (end - row) / 2;
     found = file_.tick(middle);

@@ -1,4 +1,4 @@
-// A recording as the viewer shows it.
+// Recording as shown by the viewer.
 #pragma once
 
 #include <cstdint>
@@ -22,31 +22,31 @@ struct TickRun {
   std::int64_t stride = 1;
 };
 
-/// The pictures, plots and words of a recording. One thread uses it at a time.
+/// Pictures, plots and state of a recording. For one thread at a time.
 class SessionPictures {
  public:
-  /// Throws Error when it is no recording, has no pictures, or lacks the model that computes them.
+  /// Throws Error if it is not a recording, has no pictures, or its model for computing them is missing.
   explicit SessionPictures(const std::filesystem::path& path);
   SessionPictures(const SessionPictures&) = delete;
   SessionPictures& operator=(const SessionPictures&) = delete;
 
   [[nodiscard]] Scene scene() const { return make_scene(surface(), 1); }
   [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(file_.pictures()); }
-  [[nodiscard]] std::vector<double> times() const;       ///< of all frames [s]
+  [[nodiscard]] std::vector<double> times() const;       ///< times of all frames [s]
   [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
     return file_.pictures()[static_cast<std::size_t>(frame)].time;
   }
   [[nodiscard]] const RecordedSurface& surface() const noexcept { return file_.surface(); }
   [[nodiscard]] const RecordingFile& recording() const noexcept { return file_; }
-  [[nodiscard]] std::string name() const;  ///< of the model
-  [[nodiscard]] Tool tool() const;         ///< that touched it at the start
-  /// The picture of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot
-  /// be read.
+  [[nodiscard]] std::string name() const;  ///< name of the model
+  [[nodiscard]] Tool tool() const;         ///< tool at the start
+  /// Returns the picture of frame 0 .. frames() - 1, with the tool pose of its tick. Throws Error if it
+  /// cannot be read.
   [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
-  /// The members of the message `state` that are the run's, for frames at these times, the first of which is
+  /// Returns the common members of the message `state`, for frames at these times, the first of which is
   /// shown.
   [[nodiscard]] nlohmann::json state(const std::vector<double>& times) const;
-  /// All ticks, thinned out to some 100 000 samples: a run for each stretch without a gap.
+  /// Returns all ticks, thinned out to about 100 000 samples: a run for each range without a gap.
   [[nodiscard]] std::vector<TickRun> ticks() const;
 
  private:

@@ -25,7 +25,7 @@ void SessionView::show(ViewerServer& server, std::size_t run) {
   run_ = run;
   server.show_scene(std::make_shared<const Scene>(pictures_.scene()), run);
   server.show_state(json_text(state_), run);
-  state_.erase("times");  // which the server keeps
+  state_.erase("times");  // the server keeps them
   for (const TickRun& ticks : pictures_.ticks()) server.show_ticks(ticks.notes, ticks.stride, run);
   server.show_picture(pictures_.picture(0), nullptr, run);
 }

@@ -1,4 +1,4 @@
-// A recording that the viewer's page looks through.
+// Recording that a viewer's page can view.
 #pragma once
 
 #include <cstddef>
@@ -14,14 +14,14 @@
 
 namespace palpate {
 
-/// Pages may look through it, and ask nothing else of it.
+/// Recording shown in pages, which may seek and make no other request.
 class SessionView : public ViewedRun {
  public:
-  /// As SessionPictures.
+  /// See SessionPictures.
   explicit SessionView(const std::filesystem::path& recording);
 
   [[nodiscard]] const SessionPictures& pictures() const noexcept { return pictures_; }
-  /// Shows it as this run of a server, which must live as long as pages are served.
+  /// Shows it as this run of a server, which must outlive the pages.
   void show(ViewerServer& server, std::size_t run);
 
   void seek(std::int64_t frame) override;
@@ -39,9 +39,9 @@ class SessionView : public ViewedRun {
   [[nodiscard]] std::int64_t nearest(std::int64_t frame) const;
 
   SessionPictures pictures_;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the following
   nlohmann::json state_;
-  ViewerServer* server_ = nullptr;  // null: nothing is shown yet
+  ViewerServer* server_ = nullptr;  // null: not shown yet
   std::size_t run_ = 0;
 };
 

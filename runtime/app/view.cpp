@@ -16,11 +16,11 @@
 namespace palpate {
 
 int view(const std::vector<std::filesystem::path>& recordings, ViewerOptions options) {
-  sigset_t ends;  // blocked before the server's thread begins, which inherits that
+  sigset_t ends;  // blocked before the server's thread starts, which inherits the mask
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  std::deque<SessionView> sessions;  // first: a broken file is told even where the port is taken
+  std::deque<SessionView> sessions;  // first: a broken file is reported even if the port is in use
   std::vector<RunToShow> runs;
   for (const std::filesystem::path& recording : recordings)
     runs.push_back({sessions.emplace_back(recording), true});

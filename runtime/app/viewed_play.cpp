@@ -26,7 +26,8 @@ namespace {
 constexpr auto state_period = std::chrono::milliseconds(500);
 constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
 
-/// FILE-STEM-YYYYmmdd-HHMMSS.mcap in the working directory; with a number where that is there already.
+/// Returns FILE-STEM-YYYYmmdd-HHMMSS.mcap in the working directory, with a number if that file exists
+/// already.
 std::filesystem::path name_recording(const std::filesystem::path& model) {
   std::filesystem::path stem = model.stem();  // without .hdf
   if (stem.extension() == ".palpate") stem = stem.stem();
@@ -37,7 +38,7 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
   return path;
 }
 
-/// What can be seen of a file that is gone before the body that came of it goes too.
+/// Throws Error if a file is missing, before the body loaded from it is freed.
 void expect_file(const std::filesystem::path& file) {
   check_regular_file(file, "put it back, or start palpate-runtime play anew");
 }
@@ -80,7 +81,7 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
   const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
 
   PlayedParts parts;
-  std::optional<Plan> good;  // that could be met
+  std::optional<Plan> good;  // last plan that succeeded
   for (;;) {
     const Plan plan = next_plan();
     std::unique_ptr<PlaySession> session;
@@ -114,11 +115,11 @@ std::string ViewedPlay::why_begun(const Plan& plan, const std::optional<Plan>& b
 ViewedPlay::Plan ViewedPlay::next_plan() {
   const std::lock_guard lock(mutex_);
   control_.leave = false;
-  control_.single_ticks = control_.paused ? 1 : 0;  // it shows the body as it is then
+  control_.single_ticks = control_.paused ? 1 : 0;  // shows the new state of the body
   return requested_;
 }
 
-/// The state that pages see is that of the new session from here on.
+/// Starts a session. From here on pages see the state of the new session.
 std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   if (latched_ != Fault::none && !plan.record.empty()) {
     throw Error("there is no force until the fault is acknowledged, and a recording begins without one",
@@ -131,7 +132,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   settle_tool(options, *body_);
   options.settings = apply_defaults(options.settings, input_, *body_);
   options.record = plan.record;
-  if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
+  if (!plan.record.empty() && plan.record != options_.record) {  // already checked otherwise
     OutputPaths paths;
     paths.add(plan.record, OutputKind::recording, "record");
   }
@@ -176,7 +177,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   return session;
 }
 
-/// Another body where the settings need one; the old one goes first, as it is large.
+/// Loads another body if the settings need one; the old one, which is large, is freed first.
 void ViewedPlay::load(const Settings& settings) {
   if (body_ != nullptr && body_options_ == settings.body()) return;
   expect_file(options_.file);
@@ -187,7 +188,7 @@ void ViewedPlay::load(const Settings& settings) {
   show_body();
 }
 
-/// Pages are told what they wait for.
+/// Tells the pages the reason for a delay.
 void ViewedPlay::begin_making(const char* what) {
   const std::lock_guard lock(mutex_);
   state_.busy = what;
@@ -215,20 +216,20 @@ LoopReport ViewedPlay::run_act(PlaySession& session, const std::atomic<bool>& st
   if (!session.recording_failure()) return report;
   recording_failed_ = true;
   if (stop) return report;
-  const std::lock_guard lock(mutex_);  // the next one is without it
+  const std::lock_guard lock(mutex_);  // the next session has no recording
   requested_.record.clear();
   const Error& reason = *session.recording_failure();
   refuse(Error(std::string("the recording failed: ") + reason.what(), reason.where(), reason.hint()));
   return report;
 }
 
-/// A script or a session is over: what it left is shown. False when it is to stop.
+/// Waits with the final state of a finished script or session on display. False if the run is to stop.
 bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
   while (!control_.leave && !stop) std::this_thread::sleep_for(pause_for_wishes);
   return !stop;
 }
 
-/// Back to what could be met, unless that is what failed.
+/// Returns to the last plan that succeeded, unless that plan failed itself.
 bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const Error& why) {
   const std::lock_guard lock(mutex_);
   if (failed.text == good.text && failed.record.empty()) return false;
@@ -318,7 +319,7 @@ void ViewedPlay::seek(std::int64_t) {
               "reset it to see it from its beginning");
 }
 
-/// With the mutex held, as those below.
+/// Throws if settings are locked. The caller holds mutex_, here and below.
 void ViewedPlay::refuse_while_locked() const {
   if (options_.session)
     throw PageError(PageRefusal::locked, "a replay is as its session was", "change",
@@ -329,8 +330,8 @@ void ViewedPlay::refuse_while_locked() const {
   }
 }
 
-/// What a page may change while a hand is in the device begins a session of its own: no force at once, then
-/// the same safety rules from their start, out of contact.
+/// Throws for changes that a page must not make while a hand is in the device. Allowed ones start a new
+/// session: no force at first, then the same safety rules from their start, out of contact.
 void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
   if (!has_hand()) return;
   for (const Setting& setting : settings_table()) {
@@ -340,7 +341,7 @@ void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
   }
 }
 
-/// What can be seen without loading.
+/// Checks settings without loading the body.
 void ViewedPlay::check(const Settings& settings) const {
   if (settings.contact == ContactModel::dynamic && !can_move_) {
     throw Error("the file has no dynamics, which dynamic contact needs", "--contact",
@@ -366,7 +367,7 @@ void ViewedPlay::end_act() {
   tell_.notify_all();
 }
 
-/// The page is told until its next request.
+/// Keeps the refusal for the pages until the next request.
 void ViewedPlay::refuse(const Error& why) {
   print_warning(in_one_line(why));
   state_.refused = why;
@@ -374,7 +375,7 @@ void ViewedPlay::refuse(const Error& why) {
   tell_.notify_all();
 }
 
-/// By the recorder's thread.
+/// Called by the recorder's thread.
 void ViewedPlay::take_recording_failure(const Error& reason) {
   const std::lock_guard lock(mutex_);
   state_.recording_failed = reason;
@@ -382,7 +383,7 @@ void ViewedPlay::take_recording_failure(const Error& reason) {
   tell_.notify_all();
 }
 
-/// By the thread that makes pictures, no more often than pages are told: it takes milliseconds.
+/// Called by the thread that makes pictures, no more often than the state is sent: it takes milliseconds.
 void ViewedPlay::take_change(const SurfaceFrame& frame) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_change_) return;
@@ -411,7 +412,7 @@ void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
   tell_.notify_all();
 }
 
-/// The thread that tells pages how it is, twice a second and when something changed.
+/// Main function of the thread that sends the state to pages, twice a second and after changes.
 void ViewedPlay::tell_states(const std::stop_token& over) {
   std::unique_lock lock(mutex_);
   while (!over.stop_requested()) {

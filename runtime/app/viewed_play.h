@@ -1,4 +1,4 @@
-// A run that is shown in a browser and steered from there.
+// Run that is shown in a browser and controlled from there.
 #pragma once
 
 #include <atomic>
@@ -22,26 +22,26 @@
 
 namespace palpate {
 
-/// Runs one session after the other: what a page asks for that cannot be had within a session - the untouched
-/// body, other settings, a recording - ends it and begins the next one, on the same loaded body where that
-/// will do. A request that cannot be met is told to the page, and the session before begins again.
+/// Runs sessions one after the other. A request of a page that needs a new session - the untouched body,
+/// other settings, a recording - ends the current one and starts the next, on the same loaded body if
+/// possible. If a request fails, the page gets the reason and the previous session is restarted.
 class ViewedPlay : public ViewedRun {
  public:
-  /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown;
-  /// `beside`: a recording that is shown beside it, `igtl`: who else is sent its pictures. Both live as long;
-  /// null for none.
+  /// `input` comes from make_input_source, `body` is loaded by the options; `port`: address of the viewer;
+  /// `beside`: recording shown beside it; `igtl`: server that also receives the pictures. The last two must
+  /// outlive this; null for none.
   ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port,
              SessionView* beside = nullptr, IgtlServer* igtl = nullptr);
 
-  /// Serves the pages, says where once the first session could begin, and goes on until `stop` or the end of
-  /// a duration that the options give. Tells of all sessions together, whose report it returns. Throws Error.
-  /// To be called once.
+  /// Serves the pages, prints the address once the first session could start, and continues until `stop` or
+  /// the end of the duration. Writes the report of all sessions together and returns it. Throws Error. Must
+  /// be called only once.
   LoopReport run(const std::atomic<bool>& stop);
 
-  /// Whether a recording of the run is not whole.
+  /// True if a recording of the run is incomplete.
   [[nodiscard]] bool recording_failed() const noexcept { return recording_failed_; }
 
-  /// As pages are told.
+  /// Returns the state as sent to pages.
   [[nodiscard]] RunState state() const;
 
   void point(const PointerPose& wanted) override;
@@ -55,11 +55,11 @@ class ViewedPlay : public ViewedRun {
   void seek(std::int64_t frame) override;
 
  private:
-  /// What a session is to be.
+  /// Plan of a session.
   struct Plan {
     SettingsText text;
     Settings settings;
-    std::filesystem::path record;  ///< empty: nothing
+    std::filesystem::path record;  ///< empty: no recording
   };
 
   std::unique_ptr<PlaySession> begin_act(const Plan& plan);
@@ -88,8 +88,8 @@ class ViewedPlay : public ViewedRun {
   std::unique_ptr<const Body> body_;
   BodyOptions body_options_;
   bool can_move_;   // the file has dynamics
-  int most_rings_;  // that overlays of it may have
-  double size_;     // of the body [m]
+  int most_rings_;  // most rings of its overlays
+  double size_;     // size of the body [m]
   ViewerPort port_;
   SessionView* beside_;
   IgtlServer* igtl_;
@@ -97,14 +97,14 @@ class ViewedPlay : public ViewedRun {
   LoopControl control_;
   bool recording_failed_ = false;
 
-  Fault latched_ = Fault::none;  // of the session before, where a hand is in the device
+  Fault latched_ = Fault::none;  // of the previous session, if a hand is in the device
 
-  std::chrono::steady_clock::time_point next_change_{};  // of the surface, to be found
+  std::chrono::steady_clock::time_point next_change_{};  // earliest next computation of the surface's change
 
-  mutable std::mutex mutex_;  // of what follows; the loop takes it never
-  Plan requested_;            // of the next session
+  mutable std::mutex mutex_;  // guards the following; the loop never locks it
+  Plan requested_;            // next session
   RunState state_;
-  bool changed_ = true;  // since pages were told
+  bool changed_ = true;  // since the last state sent to pages
   std::condition_variable_any tell_;
 };
 
