@@ -29,9 +29,9 @@ struct Neighbours {
   }
 };
 
-/// Aggregation as of algebraic multigrid (Vanek, Mandel, Brezina 1996): a node whose neighbours are all free
-/// makes a group with them; what is left over joins the smallest group beside it. The surface is gone through
-/// in breadth, so that groups lie side by side.
+/// Aggregation as in algebraic multigrid (Vanek, Mandel, Brezina 1996): a node whose neighbours are all free
+/// forms a group with them; remaining nodes join the smallest adjacent group. The surface is traversed
+/// breadth first, so that groups lie side by side.
 class Grouping {
  public:
   Grouping(const Neighbours& beside, const std::vector<bool>& moves)

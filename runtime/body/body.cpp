@@ -51,7 +51,7 @@ void check_sizes(const Model& model) {
   }
 }
 
-/// The surface of the elements themselves.
+/// Returns the surface of the elements, not refined.
 FineSurface surface_as_it_is(const Model& model) {
   SurfaceNumbering numbering = number_surface(model.surface, model.mesh.nodes.size());
   FineSurface surface;
@@ -65,7 +65,8 @@ FineSurface surface_as_it_is(const Model& model) {
   return surface;
 }
 
-/// Those that contact is to meet; of dynamic contact with modes still without them.
+/// Takes over the matrix for contact: Xi, or for dynamic contact K_bar^-1, to which modes are yet to be
+/// added.
 Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
   if (model.scope == Scope::none) {
     throw Error(
@@ -87,7 +88,7 @@ Greens take_greens(Model& model, const GreensOptions& options, ContactModel cont
   return Greens(std::move(greens), model.dimension(), options);
 }
 
-/// 1 / k_bar_i - 1 / omega_i^2
+/// Weights 1 / k_bar_i - 1 / omega_i^2 of the modes.
 std::vector<double> dynamic_weights(const Modes& modes, const StoredDynamics& dynamics) {
   const ModalNewmark newmark(modes.omega(), dynamics.damping, dynamics.newmark);
   std::vector<double> weights;
@@ -140,7 +141,8 @@ Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptio
   live_ = std::move(live);
 }
 
-/// Surface nodes that follow the same node of the body lie together in memory: the tick moves them together.
+/// Reorders the surface nodes so that those with the same last part are contiguous in memory: the tick moves
+/// them together.
 void Body::order_by_last_part() {
   const auto of_body = static_cast<Index>(fine_.mesh_nodes.size());
   std::vector<Index> last;
@@ -181,7 +183,7 @@ void Body::find_free_nodes() {
 
 void Body::follow_body() {
   first_part_.push_back(0);
-  std::vector<Index> last_part;  // of each surface node, -1 for none
+  std::vector<Index> last_part;  // [surface nodes] -1 for none
   for (Index node = 0; node < fine_.nodes(); ++node) {
     const auto at = static_cast<std::size_t>(node);
     Vec3 rest = Vec3::Zero();
@@ -239,7 +241,7 @@ void Body::measure_surface() {
       const double length = (surface_rest_[a] - surface_rest_[b]).norm();
       longest_surface_edge_ = std::max(longest_surface_edge_, length);
       around += length;
-      sum += length;  // a closed surface has each edge as often
+      sum += length;  // a closed surface counts each edge equally often
     }
     simplex_edges_.push_back(around / static_cast<double>(corners));
   }

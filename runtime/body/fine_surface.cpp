@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr double no_part = 1e-12;  // of a shape function
+constexpr double no_part = 1e-12;  // threshold of a shape function
 
 class Builder {
  public:
@@ -27,7 +27,7 @@ class Builder {
   FineSurface build() {
     Surface surface;
     surface.facet = traits(mesh_.element).facet;
-    std::vector<Index> elements;  // of each facet
+    std::vector<Index> elements;  // element of each facet
     for (const ElementSide& side : boundary_sides(mesh_)) {
       const auto nodes = mesh_.element_nodes(side.element);
       const auto corners = nodes.first(traits(mesh_.element).corners);
@@ -86,7 +86,7 @@ class Builder {
 
 void reorder(FineSurface& surface, std::span<const Index> order) {
   const std::size_t of_body = surface.mesh_nodes.size();
-  std::vector<Index> number(static_cast<std::size_t>(surface.nodes()));  // new, of each old one
+  std::vector<Index> number(static_cast<std::size_t>(surface.nodes()));  // new number of each old one
   std::iota(number.begin(), number.end(), 0);
   const FineSurface old = surface;
   const auto kept = static_cast<std::size_t>(old.first[of_body]);

@@ -1,4 +1,4 @@
-// The body's surface, as fine as overlays make it.
+// Surface of the body, refined as in the overlays.
 #pragma once
 
 #include <array>
@@ -11,24 +11,24 @@
 
 namespace palpate {
 
-/// The surface of all elements cut into r^d: the nodes on it, and how they follow the body's where no overlay
-/// is. Nodes of the body come first, ascending.
+/// Surface of the mesh with all elements divided into r^d: its nodes, and the body's nodes that they follow
+/// outside overlays. The body's own nodes come first, ascending.
 struct FineSurface {
-  std::vector<Index> simplices;     ///< [F * d] outward as Model::surface, in this numbering
-  std::vector<Index> element;       ///< [F] of the body, that each is on
-  std::vector<Index> mesh_nodes;    ///< [nodes of the body] their numbers in the mesh
-  std::vector<Index> first;         ///< [S + 1] of each node in `parents` and `weights`
-  std::vector<Index> parents;       ///< mesh nodes whose shape functions are not zero there
-  std::vector<double> weights;      ///< and their values
-  std::map<NodeKey, Index> number;  ///< of every node that is not one of the body's
+  std::vector<Index> simplices;     ///< [F * d] oriented outward as Model::surface, in this numbering
+  std::vector<Index> element;       ///< [F] element of the body of each simplex
+  std::vector<Index> mesh_nodes;    ///< [nodes of the body] mesh nodes
+  std::vector<Index> first;         ///< [S + 1] begin of each node's entries in `parents` and `weights`
+  std::vector<Index> parents;       ///< mesh nodes whose shape functions are not zero at the node
+  std::vector<double> weights;      ///< values of these shape functions
+  std::map<NodeKey, Index> number;  ///< numbers of all nodes that are not the body's
 
   [[nodiscard]] Index nodes() const noexcept { return static_cast<Index>(first.size()) - 1; }
 };
 
-/// Numbers the nodes that are not the body's anew: the k-th of them becomes the one that was order[k]-th.
+/// Renumbers the nodes that are not the body's: the k-th new one is the order[k]-th old one.
 void reorder(FineSurface& surface, std::span<const Index> order);
 
-/// Throws Error unless r >= 2.
+/// Builds the refined surface. Throws Error unless r >= 2.
 FineSurface make_fine_surface(const Model& model, int r);
 
 }  // namespace palpate

@@ -13,13 +13,13 @@
 namespace palpate {
 namespace {
 
-/// Ticks from one step of the file's dynamics to the next.
+/// Ticks per step of the file's dynamics.
 std::int64_t count_ticks(const Body& body, double tick) {
   const Model& model = body.model();
   if (model.dynamics.method == DynamicsMethod::none) return 1;
   const double step = model.dynamics.newmark.time_step;
   const double ticks = std::round(step / tick);
-  if (body.contact_model() == ContactModel::warped)  // its steps are of no time of the body
+  if (body.contact_model() == ContactModel::warped)  // its steps have no time of their own
     return static_cast<std::int64_t>(std::max(1.0, ticks));
   const bool dynamic = body.contact_model() == ContactModel::dynamic;
   const bool fits = ticks >= 1.0 && std::abs(ticks * tick - step) <= 1e-9 * step;
@@ -41,7 +41,7 @@ std::size_t size_if(bool wanted, std::int64_t size) {
   return wanted ? static_cast<std::size_t>(size) : 0;
 }
 
-/// Nodes to keep forces for: none of a body that does not swing.
+/// Capacity for nodes with forces: 0 for a body without dynamics.
 Index room(const Body& body, Index most_loads) {
   return body.model().dynamics.method != DynamicsMethod::none ? most_loads : 0;
 }
@@ -60,7 +60,7 @@ void add(std::span<const double> x, double factor, std::span<double> y) noexcept
   palpate::add(x.data(), factor, y.data(), std::ssize(y));
 }
 
-/// Strain energy of a body that the load displaces by u [n].
+/// Strain energy [J] of a body under a load that displaces it by u [n].
 double strain_energy(const NodalLoad& load, int dimension, std::span<const double> u) noexcept {
   const auto d = static_cast<std::size_t>(dimension);
   double sum = 0.0;
@@ -73,7 +73,7 @@ void set_zero(std::span<double> x) noexcept {
   std::fill(x.begin(), x.end(), 0.0);
 }
 
-/// Adds it to the displacement of the stored nodes [n].
+/// Adds the motion to the displacement of the stored nodes [n].
 void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept {
   const int d = body.dimension();
   for (Index node = 0; node < body.greens().nodes(); ++node)
@@ -162,7 +162,7 @@ void FreeMotion::begin_tick(const Body& body) noexcept {
   phase_ = phase_ % ticks_per_step_ + 1;
   if (modal_) {
     if (begins_step) begin_modal_step(body);
-    fade_held(body.modes()->first_dropped_omega());  // from the step's beginning on, as the modes go on
+    fade_held(body.modes()->first_dropped_omega());  // from the beginning of the step, as the modes
     const double share = static_cast<double>(phase_) / static_cast<double>(ticks_per_step_);
     const std::span<const double> q = dynamic_contact_ ? modal_->predicted() : modal_->q();
     for (std::size_t i = 0; i < shown_.size(); ++i)
@@ -276,9 +276,9 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   held_in_flight_ = true;
 }
 
-/// How fast the forces of the last ticks changed while there was contact: not as it began, when they come
-/// from nothing at once. Where the body came back meanwhile, a tool that lifts left it the strain energy that
-/// it gave back of late and no more, however fast it was: it cannot pull.
+/// Adds the rate of the forces in the last ticks of contact, except its first ones, when forces rise from
+/// zero at once. If the body moved back meanwhile, a lifting tool leaves it at most the strain energy that it
+/// released recently, however fast the tool was: a tool cannot pull.
 void FreeMotion::add_rate(const NodalLoad& last, bool grabs) noexcept {
   const auto before = [&](std::size_t ticks) -> const NodalLoad& {
     return loads_[(static_cast<std::size_t>(ticks_) + tuning.body.history - ticks) % tuning.body.history];
@@ -302,7 +302,7 @@ void FreeMotion::note_strain(std::span<const double> displacement) noexcept {
   const double before =
       strains_[static_cast<std::size_t>(ticks_ - 2 + std::ssize(loads_)) % tuning.body.history];
   strains_[last] = strain_energy(loads_[last], dimension_, displacement);
-  // Motion under a contact is stilled, that of the return too.
+  // Motion under a contact is damped, including that of the return.
   returned_ = std::max(0.0, std::exp(-tick_ / tuning.body.settling) * returned_ + before - strains_[last]);
 }
 
@@ -322,20 +322,20 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
     fade_ = 1.0;
     since_let_go_ = 0.0;
   } else {
-    // Without room for another: its energy is lost.
+    // No capacity for another release: its energy is lost.
     if (!pending_.force.add(last.nodes(), last.forces(), 1.0)) return;
     pending_.force.add(load.nodes(), load.forces(), -1.0);
     add_rate(last, grabs);
     add(displacement, 1.0, pending_held_);
   }
-  for (NodalLoad& before : loads_) {  // what is gone has no past for the next release
+  for (NodalLoad& before : loads_) {  // removed forces must not count in the next release
     before.clear();
     before.add(load.nodes(), load.forces(), 1.0);
   }
   returned_ = 0.0;
   set_zero(strains_);
   active_ = true;
-  std::fill(stamp_.begin(), stamp_.end(), -2);  // what `at` gave holds no longer
+  std::fill(stamp_.begin(), stamp_.end(), -2);  // the values returned by `at` are invalid
   if (load.count == 0) {
     set_zero(displacement);
     return;

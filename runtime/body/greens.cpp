@@ -22,16 +22,14 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t cache_line = 64;
-constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
-constexpr std::size_t nodes_ahead =
-    4;  // of a slice of u, loaded nodes ahead of their use that rows are fetched
-constexpr std::int64_t u_chunk =
-    2048;  // doubles of u that stay in the first-level cache while all rows pass by
-constexpr Index turned_forces = 128, turned_nodes = 64;  // of a part of a turned product
-constexpr std::int64_t ahead_bytes = 1024;               // how far ahead of its use a row is fetched
+constexpr std::int64_t tile = 64;       // scalars; two tiles of doubles fit into the L1 cache
+constexpr std::size_t nodes_ahead = 4;  // loaded nodes by which rows of a slice of u are prefetched
+constexpr std::int64_t u_chunk = 2048;  // doubles of u that stay in the L1 cache while all rows are read
+constexpr Index turned_forces = 128, turned_nodes = 64;  // part sizes of a turned product
+constexpr std::int64_t ahead_bytes = 1024;               // prefetch distance within a row
 
-/// Whole cache lines a row, and an odd number of them, so that equal columns of neighbouring rows do not fall
-/// into one cache set.
+/// Row length in whole cache lines, an odd number of them, so that equal columns of neighbouring rows do not
+/// map to the same cache set.
 std::int64_t padded_row(std::int64_t order, std::int64_t scalar_bytes) {
   const std::int64_t lines = (order * scalar_bytes + cache_line - 1) / cache_line;
   return (lines | 1) * cache_line / scalar_bytes;
@@ -99,8 +97,8 @@ void gather_from_packed(const PackedGreens& packed, int dimension, Index row, st
   }
 }
 
-/// u += f^T rows over `count` entries of the D rows of a node; meanwhile what comes later in them is called
-/// into the cache, or at their end the same entries of `next_rows`, those of a node that comes soon.
+/// u += f^T rows over `count` entries of the D rows of a node. Prefetches later entries of these rows or, at
+/// their end, the same entries of `next_rows`, the rows of a node needed soon.
 template <int D, class T>
 void add_rows(const T* rows, std::int64_t stride, const double* f, double* __restrict u, std::int64_t count,
               const T* next_rows) noexcept {
@@ -129,7 +127,7 @@ void add_rows(const T* rows, std::int64_t stride, const double* f, double* __res
   for (; i < count; ++i) add(i);
 }
 
-/// u = Xi E f from row `first` on; Xi is `scale` times what is stored.
+/// u = Xi E f from row `first` on; Xi is `scale` times the stored matrix.
 template <int D, class T>
 void displacement_from_square(const T* square, std::int64_t stride, std::span<const Index> nodes,
                               const double* f, std::int64_t first, std::span<double> u) noexcept {
@@ -147,7 +145,7 @@ void displacement_from_square(const T* square, std::int64_t stride, std::span<co
   }
 }
 
-/// u = Xi E f from row `first` on; Xi is `scale` times what is stored.
+/// u = Xi E f from row `first` on; Xi is `scale` times the stored matrix.
 template <class T>
 void displacement_from_packed(std::span<const T> packed, double scale, std::int64_t order, int dimension,
                               std::span<const Index> nodes, const double* f, std::int64_t first,
@@ -169,7 +167,7 @@ void displacement_from_packed(std::span<const T> packed, double scale, std::int6
   }
 }
 
-/// Calls f with the scalars for what they are.
+/// Calls f with the scalars cast to their type.
 template <class F>
 void with_scalars(const void* scalars, Precision precision, const F& f) noexcept {
   if (has_float_entries(precision)) {
@@ -371,7 +369,7 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
   displace_unturned(nodes, f, ranges, u);
 }
 
-/// In parts of forces and of nodes that fit on the stack.
+/// Processes parts of the forces and nodes that fit on the stack.
 void Greens::displace_turned(std::span<const Index> nodes, std::span<const double> f,
                              std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
   const auto d = static_cast<std::size_t>(dimension_);

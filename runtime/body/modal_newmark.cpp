@@ -5,7 +5,7 @@
 namespace palpate {
 namespace {
 
-constexpr double still = 1e-40;  // smaller ones would become numbers that processors are slow with
+constexpr double still = 1e-40;  // smaller numbers would become denormal, which is slow
 
 }  // namespace
 

@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::ptrdiff_t beyond_row = 2;  // numbers that may be read there: four at the last node
+constexpr std::ptrdiff_t beyond_row = 2;  // numbers readable past a row: four are read at the last node
 
 }  // namespace
 
@@ -85,7 +85,7 @@ void NearField::begin_tick() noexcept {
 
 bool NearField::want(const Body& body, Index surface_node) noexcept {
   if (place_of(surface_node) < 0) {
-    if (body.aggregate_of(surface_node) >= 0) return false;  // with which weights?
+    if (body.aggregate_of(surface_node) >= 0) return false;  // its weights are unknown
     if (count_ == capacity_) {
       const Index place = longest_unwanted();
       if (place < 0) return false;
@@ -139,8 +139,8 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
   }
 }
 
-/// Enters a node: where it is without forces and, beside the patch, the stored nodes that it follows and how
-/// the patch responds to it.
+/// Initialises a node: its displacement without forces and, outside the patch, the stored nodes that it
+/// follows and the response of the patch to it.
 void NearField::enter(const Body& body, Index place) noexcept {
   part_count_[at(place)] = 0;
   std::fill_n(offset_.begin() + std::ptrdiff_t{dimension_} * place, dimension_, 0.0);
@@ -165,7 +165,7 @@ void NearField::find_offset(Index place) noexcept {
   }
 }
 
-/// Enters what a surface node that is at a place, or one of several there, follows.
+/// Adds the stored nodes followed by a surface node that is at this place, alone or as a member.
 void NearField::follow(const Body& body, Index place, Index surface_node) noexcept {
   const SurfaceParts parts = body.surface_parts(surface_node);
   for (std::size_t k = 0; k < parts.stored.size(); ++k) {
@@ -182,7 +182,7 @@ void NearField::follow(const Body& body, Index place, Index surface_node) noexce
   }
 }
 
-/// Lets go of the stored nodes that nobody else follows; the last one takes the place of one that goes.
+/// Releases the stored nodes that no other place follows; the last one replaces each released one.
 void NearField::leave(Index place) noexcept {
   for (Index k = 0; k < part_count_[at(place)]; ++k) {
     const Index base = bases_of_[at(parts_ * place + k)];
@@ -201,7 +201,7 @@ void NearField::leave(Index place) noexcept {
   part_count_[at(place)] = 0;
 }
 
-/// X = Xi_Q of forces on the node, and Y = M X.
+/// Computes X = Xi_Q for forces on the node, and Y = M X.
 void NearField::respond(const Body& body, Index place) noexcept {
   const std::span<const Index> Q = patch()->stored_nodes();
   const std::ptrdiff_t width = patch_dofs();
@@ -221,7 +221,8 @@ void NearField::respond(const Body& body, Index place) noexcept {
   }
 }
 
-/// C between a node and the first `count`, which are those before it and itself; for a group it may be more.
+/// Computes C between a node and the first `count` nodes, which are those before it and itself; for a group
+/// there may be more.
 void NearField::connect(const Body& body, Index place, Index count) noexcept {
   if (patch_place(place) >= 0) {
     connect_within_patch(place);
@@ -234,7 +235,7 @@ void NearField::connect(const Body& body, Index place, Index count) noexcept {
   const std::ptrdiff_t width = d * count;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis)
     std::copy_n(blocks_.data() + axis * width, width, C_.data() + (d * place + axis) * stride_);
-  // The node's columns go into each row at once: a row is a place in memory of its own.
+  // The node's columns are written into each row at once, as each row is in memory of its own.
   for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
     double* entries = C_.data() + dof * stride_ + d * place;
     for (std::ptrdiff_t axis = 0; axis < d; ++axis)
@@ -242,7 +243,7 @@ void NearField::connect(const Body& body, Index place, Index count) noexcept {
   }
 }
 
-/// From the members' rows: A^T C A of their maps A.
+/// Computes C from the members' rows: A^T C A with their maps A.
 void NearField::connect_by_members(Index place, Index count) noexcept {
   const std::ptrdiff_t d = dimension_;
   const std::ptrdiff_t width = d * count, after = d * (place + 1);
@@ -267,7 +268,7 @@ void NearField::connect_by_members(Index place, Index count) noexcept {
   });
 }
 
-/// What a node that comes is moved by along one axis by a group that is here: `by` has that of stored nodes.
+/// Displacement of a new node along one axis by forces on a group; `by` has that by forces on stored nodes.
 void NearField::connect_to_group(Index group, const double* by, double* block) const noexcept {
   Index part = parts_ * group;  // each member follows one stored node
   std::fill_n(block, dimension_, 0.0);
@@ -330,7 +331,7 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
   }
 }
 
-/// The last node takes its place.
+/// Removes a node; the last node takes its place.
 void NearField::forget(Index place) noexcept {
   leave(place);
   const Index last = --count_;
@@ -355,7 +356,7 @@ void NearField::forget(Index place) noexcept {
   }
 }
 
-/// All that is known of a node but C, X and Y.
+/// Moves all data of a node except C, X and Y.
 void NearField::move(Index from, Index to) noexcept {
   nodes_[at(to)] = nodes_[at(from)];
   wanted_[at(to)] = wanted_[at(from)];
@@ -424,7 +425,7 @@ void NearField::change_compliance(const Body& body, std::shared_ptr<const Greens
   for (Index place = 0; place < count_; ++place) {
     if (!is_group(place)) connect(body, place);
   }
-  for (Index place = 0; place < count_; ++place) {  // from the rows of their members, which may come later
+  for (Index place = 0; place < count_; ++place) {  // from their members' rows, which may come later
     if (is_group(place)) connect(body, place, count_);
   }
   for (std::size_t dof = 0; dof < at(dimension_ * count_); ++dof) begun_[dof] -= displacement_[dof];
@@ -450,7 +451,7 @@ void NearField::load(Index place, const Vec3& force) noexcept {
   }
 }
 
-/// What the force at a place puts on the patch, for those who want the displacement there.
+/// Adds the load on the patch by the force at a place, for evaluating the displacement there.
 void NearField::load_patch(Index place) noexcept {
   const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
   if (patch_place(place) >= 0) return load_.add_to_patch(patch_place(place), f);
@@ -458,13 +459,13 @@ void NearField::load_patch(Index place) noexcept {
     palpate::add(X(dimension_ * place + axis), f[axis], load_.beside.data(), patch_dofs());
 }
 
-/// Adds a force to a part of what a place follows.
+/// Adds a force to one of the stored nodes that a place follows.
 void NearField::load_base(std::size_t part, const Vec3& f) noexcept {
   double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
   for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
 }
 
-/// What a force at a place puts on stored nodes.
+/// Adds the load on stored nodes by a force at a place.
 void NearField::load_bases(Index place, const Vec3& f) noexcept {
   std::size_t part = at(parts_ * place);
   if (is_group(place)) {
@@ -474,7 +475,7 @@ void NearField::load_bases(Index place, const Vec3& f) noexcept {
   for (Index k = 0; k < part_count_[at(place)]; ++k) load_base(part++, f);
 }
 
-/// What forces [d m] put on stored nodes and on Q.
+/// Computes the load on stored nodes and on Q by forces [d m].
 void NearField::spread(std::span<const double> forces) noexcept {
   std::fill_n(base_force_.data(), dimension_ * base_count_, 0.0);
   std::fill(patch_force_.begin(), patch_force_.end(), 0.0);
@@ -492,7 +493,7 @@ void NearField::spread(std::span<const double> forces) noexcept {
   }
 }
 
-/// Calls visit(stored node, force) for what `spread` found.
+/// Calls visit(stored node, force) for the result of `spread`.
 template <class Visit>
 void NearField::for_each_stored_force(Visit&& visit) const noexcept {
   const auto go = [&](const Index* stored, const double* force, Index count) {

@@ -1,4 +1,4 @@
-// The compliance between the surface nodes near the tools, kept from tick to tick.
+// Compliance between the surface nodes near the tools, kept from tick to tick.
 #pragma once
 
 #include <cstdint>
@@ -15,55 +15,55 @@
 namespace palpate {
 
 /// C = E^T Xi E [m/N] of the surface nodes near the tools (theory.md section 3), the forces on them and their
-/// displacement. A tick gathers only what is new: one block row for each node that comes. Nodes that are held
-/// along every axis do not move and have no place here.
+/// displacement. A tick gathers only one block row per new node. Nodes held along every axis do not move and
+/// have no place here.
 ///
-/// With a patch, Xi is that of the body with the overlay: between surface nodes of the patch it is there,
-/// between them (H) and others (X = Xi_Q, of forces there without the overlay) it is H X, and between others
-/// Xi + X^T M X (theory.md section 4). A group of surface nodes (Body::aggregate_node) has a place as a node
-/// has: its displacement is a mean of the members', its force acts on all of them by the same weights. There
-/// are none with a patch. All memory is taken at construction.
+/// With a patch, Xi is that of the body with the overlay. Between surface nodes of the patch it is the
+/// patch's compliance, between them (H) and others (X = Xi_Q, by forces there without the overlay) it is H X,
+/// and between others Xi + X^T M X (theory.md section 4). A group of surface nodes (Body::aggregate_node) has
+/// a place like a node: its displacement is a mean of its members', its force acts on all of them with the
+/// same weights. There are no groups with a patch. All memory is allocated at construction.
 class NearField {
  public:
-  /// Empty, with room for `capacity` nodes and for patches of up to `patch_nodes` nodes g.
+  /// Empty, with a capacity of `capacity` nodes and of patches of up to `patch_nodes` nodes g.
   NearField(const Body& body, Index capacity, Index patch_nodes = 0);
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
-  [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, nodes that are here
-  [[nodiscard]] Index capacity() const noexcept { return capacity_; }  ///< most of them
-  /// Place of a surface node, -1 when it is not here. Places change with `add` and `forget`.
+  [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, number of nodes
+  [[nodiscard]] Index capacity() const noexcept { return capacity_; }  ///< largest number of nodes
+  /// Place of a surface node; -1 if it is not here. Places change with `add` and `forget`.
   [[nodiscard]] Index place_of(Index surface_node) const noexcept { return place_[surface_node]; }
   /// Surface node at a place.
   [[nodiscard]] Index node(Index place) const noexcept { return nodes_[place]; }
-  /// Row of C [d m] of one dof, d place + axis. At each node four numbers may be read, whatever the last is.
+  /// Row of C [d m] of one dof, d place + axis. Four numbers may be read at every node, including the last.
   [[nodiscard]] std::span<const double> row(Index dof) const noexcept {
     return {C_.data() + static_cast<std::ptrdiff_t>(dof) * stride_,
             static_cast<std::size_t>(dimension_ * count_)};
   }
 
-  /// Takes down how far nodes have moved, and forgets one or two that were not wanted for long. Call once a
-  /// tick, before `want`.
+  /// Records the displacement change of the nodes, and removes one or two that have not been wanted for long.
+  /// Call once per tick, before `want`.
   void begin_tick() noexcept;
 
-  /// Sees to it that a node is here, with its displacement, in this tick; where there is no room the node
-  /// that was not wanted for longest goes. False when all others are wanted or loaded.
+  /// Ensures that a node is here, with its displacement, in this tick. If the capacity is full, it replaces
+  /// the node that has not been wanted for longest. False if all others are wanted or loaded.
   bool want(const Body& body, Index surface_node) noexcept;
 
-  /// Whether a surface node was wanted in this tick.
+  /// True if a surface node was wanted in this tick.
   [[nodiscard]] bool is_wanted(Index surface_node) const noexcept {
     const Index place = place_of(surface_node);
     return place >= 0 && wanted_[at(place)] == tick_;
   }
-  /// Puts a group here: a force f at its place puts maps[k] f on its k-th member, and its displacement is the
-  /// sum of maps[k]^T u_k. `weights` and `maps` are by Body::aggregates' members; `weights`, whose sum is 1,
-  /// are for whoever wants means, and where one is 0 the member does not belong to it. The others have to be
-  /// here. False where there is no room, where the group is here already and carries force or was wanted in
-  /// this tick (by other members), or with a patch.
+  /// Adds a group: a force f at its place exerts maps[k] f on its k-th member, and its displacement is the
+  /// sum of maps[k]^T u_k. `weights` and `maps` are in the order of Body::aggregates' members; `weights` sum
+  /// to 1 and define averages; a zero weight excludes the member. All other members must be here. False if
+  /// the capacity is full, if the group is here already and is loaded or was wanted in this tick (with other
+  /// members), or with a patch.
   bool want_group(const Body& body, Index group, std::span<const double> weights,
                   std::span<const Eigen::Matrix3d> maps) noexcept;
-  /// Whether a place is that of a group.
+  /// True if a place is that of a group.
   [[nodiscard]] bool is_group(Index place) const noexcept { return node(place) >= surface_nodes_; }
-  /// Calls visit(surface node, weight, map) for the nodes that belong to the group at a place.
+  /// Calls visit(surface node, weight, map) for the members of the group at a place.
   template <class Visit>
   void for_each_member(Index place, Visit&& visit) const noexcept {
     const std::size_t first = at(most_members_ * place);
@@ -71,48 +71,45 @@ class NearField {
       visit(member_[k], member_weight_[k], member_map_[k]);
   }
 
-  /// The overlay that is in C, null for none.
+  /// Overlay included in C; null for none.
   [[nodiscard]] const std::shared_ptr<const Patch>& patch() const noexcept { return load_.patch; }
-  /// Gathers all of C anew, with another overlay or none. Forces and displacement stay as they are, so that
-  /// nothing that is touched jumps away: the next forces are those of the new C. Nodes that were not wanted
-  /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for,
-  /// or groups are wanted.
+  /// Gathers C again, with another overlay or none. Forces and displacement are kept, so that a touched
+  /// surface does not jump; the next forces are those of the new C. Nodes not wanted in this tick are
+  /// removed. False, and nothing changes, if the patch exceeds the capacity, or groups are wanted.
   bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
-  /// Gathers all of C anew from another compliance, null for the body's Green's functions. Forces stay as
-  /// they are, their displacement does not. Nodes that were not wanted in this tick are forgotten where there
-  /// are no groups.
+  /// Gathers C again from another compliance; null for the body's Green's functions. Forces are kept, their
+  /// displacement is not. Nodes not wanted in this tick are removed if there are no groups.
   void change_compliance(const Body& body, std::shared_ptr<const Greens> compliance) noexcept;
-  /// How often all of C was gathered anew. As long as it is the same, so is what C has between two nodes that
-  /// stay.
+  /// Number of times that C was gathered completely. While it is the same, C between two remaining nodes is
+  /// too.
   [[nodiscard]] std::int64_t revision() const noexcept { return revision_; }
-  /// Place of a surface node in the patch, -1 when it is beside it.
+  /// Place of a surface node in the patch; -1 if it is outside.
   [[nodiscard]] Index place_in_patch(Index surface_node) const noexcept {
     return place_in_patch_[surface_node];
   }
 
-  /// Takes all forces off.
+  /// Removes all forces.
   void unload() noexcept;
-  /// Only a share of what the forces changed by since `unload`.
+  /// Scales the change of the forces since `unload` by `share`.
   void retreat(double share) noexcept;
   /// Adds to the force on the body at a place [N].
   void load(Index place, const Vec3& force) noexcept;
-  /// u = C f: the displacement of all nodes here by the forces, and what the rest of the surface follows
-  /// from.
+  /// u = C f: computes the displacement of all nodes here by the forces, and the load for the rest of the
+  /// surface.
   void displace() noexcept;
 
-  /// Adds what forces [d m] at the places here put on stored nodes, as `load` has it of the forces that are
-  /// here; as many as there is room for.
+  /// Adds to `stored` the load on stored nodes by forces [d m] at the places here, as many as fit.
   void put_on_stored_nodes(std::span<const double> forces, NodalLoad& stored) noexcept;
 
   /// Force on the body at a place [N].
   [[nodiscard]] Vec3 force(Index place) const noexcept;
   /// Displacement at a place by the forces of the last `displace` [m].
   [[nodiscard]] Vec3 displacement(Index place) const noexcept;
-  /// Displacement at a place without forces [m]: zero but for patches that have an offset.
+  /// Displacement at a place without forces [m]: zero except for patches with an offset.
   [[nodiscard]] Vec3 offset(Index place) const noexcept;
-  /// What the displacement at a place changed by in the tick before [m]; zero where it was not here.
+  /// Change of the displacement at a place in the last tick [m]; zero if it was not here.
   [[nodiscard]] Vec3 last_motion(Index place) const noexcept;
-  /// The forces of the last `displace`.
+  /// Load of the last `displace`.
   [[nodiscard]] const SurfaceLoad& load() const noexcept { return load_; }
 
  private:
@@ -151,7 +148,7 @@ class NearField {
   int dimension_;
   Index capacity_;
   Index surface_nodes_;  // S
-  Index parts_;          // room of each place for stored nodes that it follows
+  Index parts_;          // stored nodes per place, at most
   Index most_members_;
   Index count_ = 0;
   std::ptrdiff_t stride_;
@@ -162,31 +159,31 @@ class NearField {
   std::vector<Index> place_;           // [S + groups]
   std::vector<Index> place_in_patch_;  // [S + groups]
   std::vector<Index> nodes_;           // [capacity] surface nodes
-  std::vector<std::int64_t> wanted_;   // [capacity] tick in which each was wanted last
+  std::vector<std::int64_t> wanted_;   // [capacity] last tick in which each was wanted
   LargeVector<double> C_;              // [d capacity x stride]
   std::vector<double> force_;          // [d capacity]
   std::vector<double> last_force_;     // [d capacity] before `unload`
   std::vector<double> displacement_;   // [d capacity]
-  std::vector<double> begun_;          // [d capacity] displacement at the tick's begin
+  std::vector<double> begun_;          // [d capacity] displacement at the beginning of the tick
   std::vector<double> last_motion_;    // [d capacity]
   std::vector<double> offset_;         // [d capacity] displacement without forces
-  std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
-  // Stored nodes that those beside the patch follow, each once.
+  std::vector<double> blocks_;         // [d x d capacity] block row of a new node
+  // Stored nodes followed by the nodes outside the patch, without duplicates.
   Index base_count_ = 0;
-  std::vector<Index> base_;                  // [parts capacity, of the stored nodes at most] stored nodes
-  std::vector<Index> base_uses_;             // [as base] nodes that follow each
+  std::vector<Index> base_;                  // [min(parts capacity, stored nodes)] stored nodes
+  std::vector<Index> base_uses_;             // [as base] number of nodes that follow each
   std::vector<Index> base_of_stored_;        // [stored nodes] -1 for none
-  std::vector<Index> bases_of_;              // [parts x capacity] of each node
+  std::vector<Index> bases_of_;              // [parts x capacity] entries of base of each node
   std::vector<double> part_weight_;          // [parts x capacity]
   std::vector<Index> part_count_;            // [capacity]
-  std::vector<Index> member_count_;          // [capacity] of places that are groups'
+  std::vector<Index> member_count_;          // [capacity] for groups
   std::vector<Index> member_;                // [members x capacity] surface nodes of the group
   std::vector<double> member_weight_;        // [as these]
   std::vector<Eigen::Matrix3d> member_map_;  // [as these]
-  std::vector<double> by_base_;              // [d x d parts capacity] displacement of a node that comes
+  std::vector<double> by_base_;              // [d x d parts capacity] displacement of a new node
   std::vector<double> gathered_;             // [d x d max(parts capacity, patch room)]
   std::vector<double> base_force_;           // [d parts capacity]
-  LargeVector<double> X_, Y_;        // [d capacity x patch stride] X and M X of nodes beside the patch
+  LargeVector<double> X_, Y_;        // [d capacity x patch stride] X and M X of nodes outside the patch
   std::vector<double> patch_force_;  // [d patch room] on Q
   SurfaceLoad load_;
 };

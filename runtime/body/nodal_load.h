@@ -1,4 +1,4 @@
-// Forces on stored nodes, as a list.
+// List of forces on stored nodes.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// Forces on stored nodes; one node may be there several times. Calls allocate nothing.
+/// Forces on stored nodes; a node may occur several times. Calls allocate nothing.
 class NodalLoad {
  public:
   NodalLoad(int dimension, Index most_nodes)
@@ -22,7 +22,7 @@ class NodalLoad {
   NodalLoad(NodalLoad&&) = default;
   NodalLoad& operator=(NodalLoad&&) = default;
   ~NodalLoad() = default;
-  /// Assigns from a load with as much room: copies what is in it, and allocates nothing.
+  /// Assigns from a load of the same capacity: copies the entries without allocating.
   NodalLoad& operator=(const NodalLoad& other) {
     if (node_.size() != other.node_.size() || dimension_ != other.dimension_) return *this = NodalLoad(other);
     clear();
@@ -32,7 +32,7 @@ class NodalLoad {
 
   void clear() noexcept { count_ = 0; }
 
-  /// Adds `factor` times forces [dm] on m nodes. False, and nothing is added, when there is no room.
+  /// Adds `factor` times forces [dm] on m nodes. False, and nothing is added, if the capacity is exceeded.
   bool add(std::span<const Index> nodes, std::span<const double> forces, double factor) noexcept {
     if (std::ssize(nodes) > std::ssize(node_) - count_) return false;
     std::copy(nodes.begin(), nodes.end(), node_.begin() + count_);

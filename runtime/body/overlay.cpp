@@ -64,7 +64,7 @@ Overlay::Overlay(const Body& body, PatchMesh patch)
   M_ = overlay_correction(G, greens_at(body, stored_));
 }
 
-/// Xi at the patch's nodes, by forces on a node [d g x d].
+/// Xi at the patch's nodes for forces on a node [d g x d].
 Eigen::MatrixXd Overlay::columns(const Body& body, Index node) const {
   const auto d = static_cast<Eigen::Index>(body.dimension());
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(d, M_.rows());

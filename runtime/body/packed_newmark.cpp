@@ -12,9 +12,9 @@ namespace {
 
 constexpr int most_iterations = 200;
 constexpr double tolerance = 1e-14;  // of the residual of M a = b
-constexpr double still = 1e-40;      // smaller ones would become numbers that processors are slow with
+constexpr double still = 1e-40;      // smaller numbers would become denormal, which is slow
 
-/// y += A x for entries of the lower triangle.
+/// y += A x for a matrix given by the entries of its lower triangle.
 void add_product(const MassAndDamping& pattern, const std::vector<double>& entries, std::span<const double> x,
                  std::span<double> y) noexcept {
   for (std::size_t j = 0; j + 1 < pattern.start.size(); ++j) {
@@ -86,8 +86,8 @@ void PackedNewmark::let_go(std::span<const double> f, std::span<const double> u,
   }
 }
 
-/// with_M = M^-1 b by conjugate gradients with the diagonal: a mass matrix so scaled is well conditioned
-/// (Wathen 1987). Dofs that are held have no mass and stay.
+/// Computes with_M = M^-1 b by conjugate gradients with diagonal scaling, by which a mass matrix is well
+/// conditioned (Wathen 1987). Held dofs have no mass and do not move.
 void PackedNewmark::solve_mass(std::span<double> b) noexcept {
   const std::vector<double> scale = diagonal(dynamics_.matrices, dynamics_.matrices.mass);
   const std::size_t n = b.size();

@@ -15,8 +15,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t columns = 8;  // that share what is loaded of x and y
-constexpr std::int64_t ahead = 512;  // bytes of a column that are asked for early: it crosses pages
+constexpr std::int64_t columns = 8;  // columns that reuse the loaded x and y
+constexpr std::int64_t ahead = 512;  // bytes prefetched in a column, which crosses pages
 constexpr auto patience = std::chrono::microseconds(200);
 
 #ifdef __AVX512F__
@@ -36,7 +36,7 @@ Lanes<double> load(const double* from) noexcept {
 }
 
 Lanes<double> load(const float* from) noexcept {
-#ifdef __AVX512F__  // GCC 12 converts one half after the other
+#ifdef __AVX512F__  // GCC 12 converts the halves one after the other
   return _mm512_cvtps_pd(_mm256_loadu_ps(from));
 #else
   Lanes<float> value;
@@ -46,7 +46,7 @@ Lanes<double> load(const float* from) noexcept {
 }
 
 /// y += A x and the dot products of the columns with x, over rows [first, first + count) below the diagonal
-/// of a group of columns; `a` are their entries there.
+/// of a group of columns; `a` points to their entries there.
 template <class T>
 void multiply_rows(const std::array<const T*, columns>& a, const std::array<double, columns>& by,
                    const double* __restrict x, double* __restrict y, std::array<double, columns>& sums,
@@ -80,7 +80,7 @@ void multiply_rows(const std::array<const T*, columns>& a, const std::array<doub
   }
 }
 
-/// Columns [first, last) of the packed triangle: y [rows from first on].
+/// Multiplies the columns [first, last) of the packed triangle; y has the rows from `first` on.
 template <class T>
 void multiply_columns(std::span<const T> packed, std::int64_t order, const double* x, std::int64_t first,
                       std::int64_t last, std::span<double> y) noexcept {
@@ -120,7 +120,7 @@ void multiply_columns(std::span<const T> packed, std::int64_t order, const doubl
 PackedProduct::PackedProduct(const PackedGreens& matrix, int jobs)
     : matrix_(matrix),
       by_smooth_(matrix.smooth() == nullptr ? 0 : static_cast<std::size_t>(matrix.smooth()->terms)) {
-  // As many entries each: those of the columns from j on are (n - j)^2 / 2.
+  // Parts with equal numbers of entries: the columns from j on have (n - j)^2 / 2.
   const std::int64_t n = matrix.order();
   std::int64_t first = 0;
   for (int k = 1; k <= jobs; ++k) {
@@ -151,7 +151,7 @@ void PackedProduct::multiply(std::span<const double> x, std::span<double> y) noe
   if (!by_smooth_.empty()) add_smooth(x, y);
 }
 
-/// y += W W^T x
+/// y += W W^T x.
 void PackedProduct::add_smooth(std::span<const double> x, std::span<double> y) noexcept {
   const SmoothPart& smooth = *matrix_.smooth();
   std::fill(by_smooth_.begin(), by_smooth_.end(), 0.0);
@@ -174,7 +174,7 @@ void PackedProduct::help(Part& part, const std::stop_token& stop) noexcept {
   while (true) {
     const auto begin = std::chrono::steady_clock::now();
     while (round_ == seen && std::chrono::steady_clock::now() - begin < patience) {
-      std::this_thread::yield();  // where processors are short, to whom it waits for
+      std::this_thread::yield();  // if processors are scarce, gives way to the awaited thread
     }
     round_.wait(seen);
     seen = round_;

@@ -1,4 +1,4 @@
-// y = A x of a symmetric matrix in packed storage, as fast as memory gives it.
+// Product y = A x of a packed symmetric matrix, at the speed of the memory.
 #pragma once
 
 #include <atomic>
@@ -11,13 +11,13 @@
 
 namespace palpate {
 
-/// Multiplies a packed symmetric matrix by vectors, on several threads: each entry is read once and counts
-/// for both triangles. Arithmetic is in double; the result does not depend on which thread was faster.
-/// Helpers spin for some microseconds after a product, so that products in a row begin at once, and sleep
-/// after that. For one caller at a time, not for the tick.
+/// Multiplies a packed symmetric matrix by vectors, on several threads. Each entry is read once and used for
+/// both triangles. Arithmetic is in double; the result does not depend on the threads' timing. Helper threads
+/// spin for some microseconds after a product, so that consecutive products start at once, and then sleep.
+/// For one caller at a time, not for the tick.
 class PackedProduct {
  public:
-  /// `jobs` threads, the caller among them. The matrix must live as long.
+  /// `jobs` threads, including the caller. The matrix must outlive this.
   PackedProduct(const PackedGreens& matrix, int jobs);
   ~PackedProduct();
   PackedProduct(const PackedProduct&) = delete;
@@ -43,8 +43,8 @@ class PackedProduct {
   std::vector<Part> parts_;
   std::vector<double> by_smooth_;  // [k] W^T x of split precision
   const double* x_ = nullptr;
-  std::atomic<std::uint32_t> round_ = 0;    // of products
-  std::atomic<std::uint32_t> working_ = 0;  // helpers that are not done with this round
+  std::atomic<std::uint32_t> round_ = 0;    // number of products
+  std::atomic<std::uint32_t> working_ = 0;  // helpers still working on this product
   std::vector<std::jthread> helpers_;
 };
 

@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// Whether the sizes are those of this mesh, and the surface's nodes.
+/// True if sizes and surface nodes are those of this mesh.
 bool fits(const CondensedPatch& condensed, const PatchMesh& mesh, int dimension) {
   const std::vector<Index> surface = surface_nodes(mesh);
   const Eigen::Index g = dimension * std::ssize(mesh.nodes), m = dimension * std::ssize(surface);

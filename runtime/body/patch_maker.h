@@ -1,4 +1,4 @@
-// Makes the overlays of a body.
+// Factory of a body's overlays.
 #pragma once
 
 #include <memory>
@@ -8,31 +8,32 @@
 
 namespace palpate {
 
-/// How fine overlays are and how far they reach.
+/// Refinement and reach of overlays.
 struct OverlayOptions {
-  int refinement = 3;  ///< r: each element is cut into r^d
-  int rings = 2;       ///< of elements round the centres
+  int refinement = 3;  ///< r: each element is divided into r^d
+  int rings = 2;       ///< rings of elements around the centres
 };
 
-/// Patches round nodes of a body's surface. For one thread at a time.
+/// Makes patches around nodes of a body's surface. For one thread at a time.
 class PatchMaker {
  public:
-  /// For a body whose surface is refined as the overlays will be; it must live as long.
+  /// For a body whose surface is refined like the overlays; it must outlive this.
   PatchMaker(const Body& body, int rings);
 
-  /// One patch over the elements within the rings round all centres (stored nodes): where those of several
-  /// overlap they are one. Round one centre it is taken from the file where that has it, else condensed.
-  /// Throws Error when the elements are too flat, the file keeps too few layers below the surface, or what
-  /// the file has is not of this patch.
+  /// Makes one patch over the elements within the rings around all centres (stored nodes); overlapping
+  /// regions are merged. For a single centre it is taken from the file if available, otherwise condensed.
+  /// Throws Error if the elements are too flat, the file has too few layers below the surface, or the file's
+  /// data do not fit this patch.
   [[nodiscard]] std::shared_ptr<const Patch> make(std::span<const Index> centres);
 
-  /// The fine mesh of that patch. Throws Error as `make` does.
+  /// Returns the fine mesh of that patch. Throws Error as `make` does.
   [[nodiscard]] PatchMesh mesh(std::span<const Index> centres);
 
-  /// What the file has of the patch round a stored node, null where it has none as the body's and ours are.
+  /// Returns the file's data of the patch around a stored node; null if there are none with this refinement
+  /// and number of rings.
   [[nodiscard]] const CondensedPatch* stored(Index centre) const noexcept;
 
-  /// Stored nodes on the surface that share an element with one.
+  /// Stored surface nodes that have an element in common with `centre`.
   [[nodiscard]] std::vector<Index> neighbours(Index centre) const;
 
  private:
@@ -42,12 +43,11 @@ class PatchMaker {
   int rings_;
 };
 
-/// Tools that overlays follow; what further ones touch has none of their own.
+/// Number of tools that overlays follow; further tools have none of their own.
 inline constexpr std::size_t most_overlay_tools = 4;
 
-/// The largest number g of nodes that patches of so many tools can have: give it as
-/// StateOptions::patch_nodes. Throws Error when the file keeps too few layers below the surface for one of
-/// them.
+/// Returns the largest number g of nodes in patches for this number of tools, to be given as
+/// StateOptions::patch_nodes. Throws Error if the file has too few layers below the surface for one of them.
 Index patch_room(const Body& body, int rings, std::size_t tools);
 
 }  // namespace palpate

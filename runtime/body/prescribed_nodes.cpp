@@ -16,7 +16,7 @@ std::size_t dofs(int dimension, Index nodes) noexcept {
   return static_cast<std::size_t>(dimension) * static_cast<std::size_t>(nodes);
 }
 
-/// Closes the gap of the entries of one node: those of the later nodes move up.
+/// Removes the entries of one node: those of later nodes move up.
 template <class T>
 void erase_entries(std::vector<T>& values, Index k, Index nodes, std::ptrdiff_t entries) noexcept {
   T* gap = values.data() + entries * k;

@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// Whether some vector is not zero along an axis where `fixed` says `held`.
+/// True if some vector is not zero along an axis that is held (`held`) or free according to `fixed`.
 bool has_any(const std::vector<Vec3>& vectors, const std::vector<std::uint8_t>& fixed, bool held) {
   for (std::size_t node = 0; node < vectors.size(); ++node) {
     for (unsigned axis = 0; axis < 3; ++axis) {
@@ -26,7 +26,8 @@ bool has_initial_strain(const Model& model) {
   });
 }
 
-/// Forces displace by their share of 1 / E, what is prescribed by itself.
+/// Scales the displacement at rest: by forces it is proportional to 1 / E, by prescribed displacements it is
+/// unchanged.
 void scale_rest(Model& model, double scale) {
   const bool prescribed = has_any(model.rest_displacement, model.fixed, true);
   const bool loaded = has_any(model.rest_force, model.fixed, false);
@@ -63,7 +64,7 @@ void scale_stiffness(Model& model, double scale) {
   for (Material& material : model.materials) material.youngs_modulus *= scale;
   model.greens = model.greens.scaled(1.0 / scale);
   if (model.compressed != nullptr) {
-    auto scaled = std::make_shared<HierarchicalMatrix>(*model.compressed);  // of the same arrays
+    auto scaled = std::make_shared<HierarchicalMatrix>(*model.compressed);  // sharing its arrays
     scaled->scale /= scale;
     model.compressed = scaled;
   }

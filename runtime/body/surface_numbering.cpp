@@ -14,9 +14,9 @@
 namespace palpate {
 namespace {
 
-/// A simplex, whatever the order of its nodes.
+/// Simplex, independent of the order of its nodes.
 struct OwnedSimplex {
-  std::array<Index, 3> nodes;  ///< ascending; beyond those of a line the largest Index
+  std::array<Index, 3> nodes;  ///< ascending; unused ones of a line are the largest Index
   Index element;
 
   bool operator<(const OwnedSimplex& other) const { return nodes < other.nodes; }
@@ -30,11 +30,11 @@ OwnedSimplex owned(std::span<const Index> nodes, Index element) {
   return simplex;
 }
 
-/// The simplices of all sides that belong to one element only, sorted.
+/// Returns the simplices of all facets that belong to one element only, sorted.
 std::vector<OwnedSimplex> boundary_simplices(const Mesh& mesh) {
   Surface boundary;
   boundary.facet = traits(mesh.element).facet;
-  std::vector<Index> elements;  // of each facet
+  std::vector<Index> elements;  // element of each facet
   const std::vector<ElementSide> sides = sorted_sides(mesh);
   for (auto side = sides.begin(); side != sides.end();) {
     const auto end =
@@ -51,7 +51,7 @@ std::vector<OwnedSimplex> boundary_simplices(const Mesh& mesh) {
   const auto d = static_cast<std::size_t>(mesh.dimension());
   std::vector<OwnedSimplex> simplices;
   for (std::size_t at = 0; at < nodes.size(); at += d) {
-    const std::size_t facet = at * elements.size() / nodes.size();  // all are cut into as many
+    const std::size_t facet = at * elements.size() / nodes.size();  // each facet is divided into equally many
     simplices.push_back(owned(std::span(nodes).subspan(at, d), elements[facet]));
   }
   std::sort(simplices.begin(), simplices.end());

@@ -1,4 +1,4 @@
-// The elements under the surface that a tool meets.
+// Elements below the contact surface.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// The element that each simplex of model.surface is a side, or a part of a side, of. [F] Throws Error (where
-/// = the model's name) for a simplex that is none.
+/// Returns the element [F] of which each simplex of model.surface is a facet or a part of one. Throws Error
+/// (where = the model's name) if there is none.
 std::vector<Index> surface_elements(const Model& model);
 
 }  // namespace palpate
