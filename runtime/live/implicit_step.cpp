@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr int most_halvings = 20;  // of a step of Newton's
+constexpr int most_halvings = 20;  // halvings of a Newton step
 
 }  // namespace
 
@@ -28,7 +28,7 @@ StepFactors step_factors(Integrator integrator, double h) {
     const Newmark scheme{.time_step = h};
     return {.s = scheme.a0(), .t = scheme.a1()};
   }
-  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the middle
+  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the midpoint
   const double t = 1.0 / (half ? 0.5 * h : h);
   return {.s = t * t, .t = t, .ahead = half ? 2.0 : 1.0};
 }
@@ -46,7 +46,7 @@ ImplicitStep::Kinematics ImplicitStep::kinematics(const LiveState& state, double
   return step;
 }
 
-/// Fills the forces that are left on free dofs; the potential whose slope they are [J].
+/// Computes the residual forces on free dofs and returns the potential of which they are the gradient [J].
 double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
                           const Kinematics& step) {
   const Eigen::VectorXd& M = body_.mass();
@@ -80,7 +80,7 @@ double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, cons
   return potential;
 }
 
-/// A = s M + t C_d + K. False when it is not positive definite.
+/// Sets A = s M + t C_d + K. False if it is not positive definite.
 bool ImplicitStep::set_matrix(const Eigen::VectorXd& x, const LiveState& state, const Kinematics& step,
                               TangentKind kind) {
   assemble_tangent(body_, x, state.plastic, kind, K_);
@@ -92,7 +92,7 @@ bool ImplicitStep::set_matrix(const Eigen::VectorXd& x, const LiveState& state, 
   for (Index free = 0; free < body_.free_dofs(); ++free)
     A_.valuePtr()[body_.pattern().diagonal()[free]] +=
         (step.s + step.t * damping.mass) * body_.mass()[body_.dof_of_free()[free]];
-  double sum = 0.0;  // what rounding of x makes of forces
+  double sum = 0.0;  // sum for the rounding error of the forces
   for (Index free = 0; free < body_.free_dofs(); ++free) {
     const double force = A_.valuePtr()[body_.pattern().diagonal()[free]] * x[body_.dof_of_free()[free]];
     sum += force * force;
@@ -107,7 +107,7 @@ double ImplicitStep::share_left() const noexcept {
   return left_.norm() > rounding_ ? left_.norm() / largest : 0.0;
 }
 
-/// One step of Newton's, with the walls' answer. False when it leads nowhere.
+/// Performs one Newton step, including wall forces. False if it does not reduce the residual.
 bool ImplicitStep::newton_step(Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
                                const Kinematics& step, double& potential) {
   if (!set_matrix(x, state, step, TangentKind::positive) || !solver_.solve(left_, change_)) return false;
@@ -136,7 +136,7 @@ bool ImplicitStep::newton_step(Eigen::VectorXd& x, const LiveState& state, const
   return false;
 }
 
-/// Velocity and acceleration at the end of the step.
+/// Computes velocity and acceleration at the end of the step.
 void ImplicitStep::finish(const Eigen::VectorXd& x, const Eigen::VectorXd& push, const Kinematics& step,
                           LiveState& state) {
   for (Index free = 0; free < body_.free_dofs(); ++free) {
@@ -153,7 +153,7 @@ void ImplicitStep::finish(const Eigen::VectorXd& x, const Eigen::VectorXd& push,
     state.x[dof] += step.ahead * moved;
   }
   if (options_.integrator == Integrator::implicit_euler) return;
-  for (const WallContacts::Contact& contact : contacts_.contacts()) {  // which do not throw back
+  for (const WallContacts::Contact& contact : contacts_.contacts()) {  // walls are inelastic
     if (contact.force == Vec3::Zero()) continue;
     auto v = state.v.segment(Eigen::Index{body_.dimension()} * contact.node, body_.dimension());
     const auto n = contact.normal.head(body_.dimension());
@@ -180,7 +180,8 @@ ImplicitReport ImplicitStep::advance(LiveState& state, double h, const Eigen::Ve
     report.converged = report.residual <= options_.tolerance;
     if (report.converged) break;
   }
-  // Rounding can hide progress from the line search: what is left then decides. One linear step is as it is.
+  // Rounding can hide progress from the line search; then the residual decides. A single linear step is
+  // accepted as it is.
   report.residual = share_left();
   report.converged =
       report.residual <= 100.0 * options_.tolerance || (options_.most_newton == 1 && x.allFinite());

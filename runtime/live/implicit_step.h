@@ -1,4 +1,4 @@
-// Implicit steps of a live body: Newton's method on the balance at the end of the step.
+// Implicit time steps of a live body: Newton's method for the balance of forces.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,34 +13,36 @@ namespace palpate {
 struct ImplicitOptions {
   Integrator integrator = Integrator::implicit_euler;
   TangentSolverOptions solver{};
-  double tolerance = 1e-8;  ///< forces left, of the largest in the way
-  int most_newton = 20;     ///< Newton's steps; with 1 each time step is linear, as real-time solvers have it
+  double tolerance = 1e-8;  ///< residual force, relative to the largest force during the step
+  int most_newton = 20;     ///< Newton steps; with 1 each time step is linear, as in real-time solvers
 };
 
 struct ImplicitReport {
   bool converged = false;
-  int newton = 0;         ///< steps of Newton's method
-  double residual = 0.0;  ///< as `tolerance` has it
-  Index inverted = 0;     ///< most quadrature points on the way
+  int newton = 0;         ///< number of Newton steps
+  double residual = 0.0;  ///< residual relative to the largest force, see `tolerance`
+  Index inverted = 0;     ///< largest number of inverted quadrature points during the step
 };
 
-/// What an implicit integrator makes of a step: at the positions x that it solves for, velocity is t (x - x0)
-/// and acceleration s (x - x0), beside what was before.
+/// Coefficients of an implicit integrator: at the solved positions x, the velocity is t (x - x0) and the
+/// acceleration s (x - x0), plus terms from the previous state.
 struct StepFactors {
   double s = 0.0;      ///< [1/s^2]
   double t = 0.0;      ///< [1/s]
-  double ahead = 1.0;  ///< the step's end is as many times as far from its beginning as x is
+  double ahead = 1.0;  ///< (x at the end of the step - x0) / (solved x - x0)
 };
 StepFactors step_factors(Integrator integrator, double h);
 
-/// Steps M x'' + C_d x' = f(x) + load by implicit Euler, the midpoint rule or Newmark's method, in walls. C_d
-/// = a M + b K with K the positive tangent where the step begins. A is the matrix of Newton's last step, s M
-/// + t C_d + K: its inverse says how positions at the step's end follow forces.
+/// Steps M x'' + C_d x' = f(x) + load by implicit Euler, the midpoint rule or Newmark's method, with walls.
+/// C_d = a M + b K with the positive tangent K at the beginning of the step. A is the matrix of the last
+/// Newton step, s M + t C_d + K: its inverse is the response of the positions at the end of the step to
+/// forces.
 class ImplicitStep {
  public:
   ImplicitStep(const LiveBody& body, const ImplicitOptions& options, std::vector<Wall> walls);
 
-  /// From state by h [s] under `push` [d N] beside the body's load [N]. On failure state is not whole.
+  /// Advances the state by h [s] under `push` [d N] in addition to the body's load [N]. After a failure the
+  /// state is invalid.
   ImplicitReport advance(LiveState& state, double h, const Eigen::VectorXd& push);
 
   [[nodiscard]] const TangentSolver& solver() const noexcept { return solver_; }
@@ -66,10 +68,10 @@ class ImplicitStep {
   ImplicitOptions options_;
   TangentSolver solver_;
   WallContacts contacts_;
-  LiveMatrix A_, K_, damping_;                                // damping_: b K where the step began
+  LiveMatrix A_, K_, damping_;                                // damping_: b K at the beginning of the step
   Eigen::VectorXd forces_, wall_forces_, inertia_, viscous_;  // [d N]
   Index inverted_ = 0;
-  double rounding_ = 0.0;          // of forces [N]
+  double rounding_ = 0.0;          // rounding error of forces [N]
   Eigen::VectorXd left_, change_;  // [n]
 };
 

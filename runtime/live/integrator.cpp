@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-/// Whether no motion of an oscillator with omega = 1 grows in steps of h.
+/// True if no motion of an oscillator with omega = 1 grows in steps of h.
 bool is_stable(Integrator integrator, double h, double zeta) {
   Eigen::Matrix2d A;
   const auto accelerate = [zeta](double x, double v) { return -x - 2.0 * zeta * v; };
@@ -31,10 +31,10 @@ const char* name_of(Integrator integrator) noexcept {
 
 double longest_stable_step(Integrator integrator, double omega, double zeta) {
   if (is_implicit(integrator) || !(omega > 0.0)) return std::numeric_limits<double>::infinity();
-  // |1 - zeta h +- i sqrt(1 - zeta^2) h| <= 1, and of real roots the larger one.
+  // |1 - zeta h +- i sqrt(1 - zeta^2) h| <= 1; of real roots the larger one.
   if (integrator == Integrator::explicit_euler)
     return 2.0 / omega * (zeta <= 1.0 ? zeta : 1.0 / (zeta + std::sqrt(zeta * zeta - 1.0)));
-  // The first step, of growing ones, that is not stable; then between it and the last that is.
+  // Finds the first unstable step among growing ones, then bisects between it and the last stable one.
   double stable = 0.0, unstable = 0.01;
   while (unstable < 10.0 && is_stable(integrator, unstable, zeta)) {
     stable = unstable;

@@ -1,4 +1,4 @@
-// Time integrators of live bodies: those that Sito (2019, section 3.3) compares, Newmark's, and the midpoint
+// Time integrators of live bodies: those compared by Sito (2019, section 3.3), Newmark's, and the midpoint
 // rule.
 #pragma once
 
@@ -9,12 +9,12 @@ namespace palpate {
 
 enum class Integrator : std::uint8_t {
   explicit_euler,
-  semi_implicit_euler,  ///< or symplectic
+  semi_implicit_euler,  ///< also called symplectic Euler
   rk2,                  ///< the explicit midpoint rule
   rk4,
-  verlet,          ///< velocity Verlet; damping at the velocity in the middle of the step
-  implicit_euler,  ///< damps what moves faster than its step
-  midpoint,        ///< implicit; keeps momentum and angular momentum
+  verlet,          ///< velocity Verlet; damping at the mid-step velocity
+  implicit_euler,  ///< damps motion faster than its step
+  midpoint,        ///< implicit; conserves momentum and angular momentum
   newmark,         ///< alpha = 1/4, delta = 1/2 (theory.md section 5)
 };
 
@@ -22,7 +22,7 @@ inline constexpr std::array<Integrator, 8> all_integrators = {
     Integrator::explicit_euler, Integrator::semi_implicit_euler, Integrator::rk2,      Integrator::rk4,
     Integrator::verlet,         Integrator::implicit_euler,      Integrator::midpoint, Integrator::newmark};
 
-/// The names that users give: explicit-euler, semi-implicit-euler, rk2, rk4, verlet, implicit-euler,
+/// Returns the name as users give it: explicit-euler, semi-implicit-euler, rk2, rk4, verlet, implicit-euler,
 /// midpoint, newmark.
 const char* name_of(Integrator integrator) noexcept;
 
@@ -30,8 +30,8 @@ constexpr bool is_implicit(Integrator integrator) noexcept {
   return integrator >= Integrator::implicit_euler;
 }
 
-/// One step h [s] of x'' = a(x, x') by an explicit integrator: x and v in place. Vectors of any kind, numbers
-/// too; accelerate(x, v) returns one.
+/// Performs one step h [s] of x'' = a(x, x') by an explicit integrator, in place. Any type of vector or
+/// number; accelerate(x, v) returns the same type.
 template <class Vector, class Accelerate>
 void step_explicitly(Integrator integrator, double h, const Accelerate& accelerate, Vector& x, Vector& v) {
   switch (integrator) {
@@ -70,8 +70,8 @@ void step_explicitly(Integrator integrator, double h, const Accelerate& accelera
   }
 }
 
-/// The longest step [s] with which an oscillator of angular frequency omega [rad/s] and damping ratio zeta
-/// does not grow: infinity of the implicit ones, 0 of explicit Euler and RK2 without damping.
+/// Longest step [s] for which an oscillator of angular frequency omega [rad/s] and damping ratio zeta does
+/// not grow: infinity for implicit integrators, 0 for explicit Euler and RK2 without damping.
 double longest_stable_step(Integrator integrator, double omega, double zeta);
 
 }  // namespace palpate

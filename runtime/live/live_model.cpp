@@ -16,9 +16,9 @@ namespace palpate {
 namespace {
 
 constexpr Eigen::Index most_seen_dofs =
-    3000;  // of a body in the plane whose inside is seen; a larger W is not renewed
+    3000;  // limit for a body in the plane with a visible interior; a larger W is not renewed
 
-/// Throws Error where nodes that can move begin in a wall.
+/// Throws Error if a movable node starts inside a wall.
 void check_start(const LiveBody& body, const std::vector<Wall>& walls) {
   const int d = body.dimension();
   const double least = -1e-9 * (body.rest().maxCoeff() - body.rest().minCoeff());
@@ -36,14 +36,14 @@ void check_start(const LiveBody& body, const std::vector<Wall>& walls) {
   }
 }
 
-/// Where the body rests: in balance, where that is found.
+/// Rest position: that of balance, if it is found.
 Eigen::VectorXd rest_of(const LiveBody& body) {
   Eigen::VectorXd x = body.start();
   if (body.free_dofs() == body.dofs()) return x;
   return find_balance(body, body.load(), {}, x, {.tolerance = 1e-8}).converged ? x : body.start();
 }
 
-/// The compliance of a step at x.
+/// Compliance of a step at x.
 PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, const std::vector<Index>& nodes) {
   StepCompliance compliance(live.body, live.stepper, nodes);
   if (!compliance.begin(x, {})) {
@@ -54,7 +54,7 @@ PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, cons
   return compliance.take();
 }
 
-/// All, or those on the surface, ascending.
+/// Returns all nodes, or those on the surface, ascending.
 std::vector<Index> nodes_in(const Model& model) {
   std::vector<Index> nodes = model.surface;
   if (model.scope == Scope::full) nodes = model.mesh.connectivity;
@@ -85,7 +85,7 @@ LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
   LiveParts parts{LiveBody(std::move(input), live_options(settings)),
                   stepper_options(settings, model.dimension())};
   check_start(parts.body, parts.stepper.walls);
-  if (!is_implicit(settings.integrator)) LiveStepper(parts.body, parts.stepper);  // refuses what is unstable
+  if (!is_implicit(settings.integrator)) LiveStepper(parts.body, parts.stepper);  // throws if unstable
   return parts;
 }
 

@@ -1,4 +1,4 @@
-// A file's model as a live solver moves it, for the tick.
+// Model of a live body in the form that the tick uses.
 #pragma once
 
 #include "formats/model.h"
@@ -8,21 +8,21 @@
 
 namespace palpate {
 
-/// A body that is solved while it is touched, and what its steps are.
+/// Live body, which is solved during the touch, with the options of its steps.
 struct LiveParts {
   LiveBody body;
   StepperOptions stepper;
 };
 
-/// The body of a model; with `free` nothing of it is held, and with a Poisson's ratio its materials have
-/// that. Throws Error for settings that do not fit it, and for explicit steps longer than is stable.
+/// Makes the live body of a model. With `free` it has no supports, and a given Poisson's ratio replaces that
+/// of its materials. Throws Error if the settings do not fit the model, or explicit steps are unstable.
 LiveParts make_live_parts(const Model& model, const LiveSettings& settings);
 
-/// The model with what the tick needs of a live body in place of its Green's functions, overlays and
-/// dynamics: stored are all nodes of the surface that can move, of a body in the plane with up to 3000 dofs
-/// all nodes, so that its inside is seen; it rests where its forces balance, or as its mesh is where they do
-/// not; `greens` is the compliance of one step there, by how much its end moves with the forces in it (of
-/// implicit Euler (M / h^2 + C_d / h + K)^-1); dynamics are those of steps beside the tick.
+/// Returns the model with the tick's data of a live body instead of its Green's functions, overlays and
+/// dynamics. Stored nodes are all movable surface nodes; in the plane, with up to 3000 dofs, all nodes, so
+/// that the interior is visible. The rest position is that of balance, or of the mesh if it is not found.
+/// `greens` is the compliance of one step there: the displacement of its end per force during it (for
+/// implicit Euler (M / h^2 + C_d / h + K)^-1). The dynamics are those of steps beside the tick.
 Model live_model(Model model, const LiveParts& live, const LiveSettings& settings);
 
 }  // namespace palpate

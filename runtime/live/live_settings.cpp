@@ -12,7 +12,7 @@ namespace {
 
 constexpr double most_gravity = 1000.0;  // [m/s^2]
 
-/// The corners of a box, which in the plane reaches all along z.
+/// Returns the corners of a box, which in the plane is unbounded along z.
 AxisBox whole(AxisBox box, int dimension, const char* option) {
   if (dimension == 2) {
     box.low.z() = -1.0;

@@ -11,11 +11,11 @@
 namespace palpate {
 namespace {
 
-constexpr int most_depth = 8;          // of halving
-constexpr int rounds_at_rest = 300;    // of the power iteration
-constexpr int rounds_between = 4;      // at each look
-constexpr std::int64_t look_each = 4;  // steps
-constexpr double near_share = 0.9;     // of the limit
+constexpr int most_depth = 8;          // nested halvings
+constexpr int rounds_at_rest = 300;    // iterations of the power method
+constexpr int rounds_between = 4;      // iterations per check
+constexpr std::int64_t look_each = 4;  // steps between checks
+constexpr double near_share = 0.9;     // fraction of the limit
 
 double limit_at(const LiveBody& body, const StepperOptions& options, LargestFrequency& frequency) {
   if (is_implicit(options.scheme.integrator)) return std::numeric_limits<double>::infinity();
@@ -78,7 +78,7 @@ LiveReport LiveStepper::step(LiveState& state, const Eigen::VectorXd& push) {
   return report;
 }
 
-/// M a = f - C_d v of the free dofs.
+/// Solves M a = f - C_d v for the free dofs.
 void LiveStepper::find_acceleration(LiveState& state, const Eigen::VectorXd& push) {
   internal_forces(body_, state.x, state.plastic, forces_);
   forces_ += body_.load() + push;
@@ -95,7 +95,8 @@ void LiveStepper::watch_limit(const LiveState& state, LiveReport& report) {
   report.is_near = options_.time_step > near_share * limit_;
 }
 
-/// One step of h, or two halves of it. False when the shortest ones diverge too: the body then stands still.
+/// Performs one step of h, or two halves of it. False if the shortest ones diverge too: the body is then
+/// stopped.
 bool LiveStepper::advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth,
                           LiveReport& report) {
   const LiveState before = state;
@@ -133,8 +134,8 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
                                      LiveReport& report) {
   const Eigen::VectorXd from = state.x;
   double energy_before = -1.0, energy = 0.0;
-  // Forces are those of the body as walls let it be and move: within them, stiffness and damping throw back
-  // nodes that only come to rest there, and friction has nothing to hold them by.
+  // Forces are evaluated with the walls' constraints applied: inside walls, stiffness and damping would throw
+  // back nodes that merely come to rest there, and friction would have no effect.
   const auto accelerate = [&](Eigen::VectorXd x, Eigen::VectorXd v) {
     if (!options_.walls.empty()) {
       Eigen::VectorXd any = v, end = from + h * v;
@@ -156,7 +157,7 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
   const auto kinetic = [&] { return 0.5 * state.v.dot(body_.mass().cwiseProduct(state.v)); };
   const double kinetic_before = kinetic();
   step_explicitly(options_.scheme.integrator, h, accelerate, state.x, state.v);
-  // No stable step makes energy of this size by itself.
+  // A stable step does not create this much energy.
   const double work =
       (body_.load() + push).cwiseAbs().dot((state.x - from).cwiseAbs() + h * state.v.cwiseAbs());
   const double most = 4.0 * (kinetic_before + energy_before + work);
@@ -165,7 +166,7 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
   return true;
 }
 
-/// What walls do to all nodes in a step from `from`: how many they stop.
+/// Applies the walls to all nodes in a step from `from`; returns the number of stopped nodes.
 Index LiveStepper::meet_walls(const Eigen::VectorXd& from, double h, Eigen::VectorXd& x,
                               Eigen::VectorXd& v) const {
   if (options_.walls.empty()) return 0;

@@ -1,4 +1,4 @@
-// Steps a live body, and sees to it that steps stay whole.
+// Time stepping of a live body, with safeguards against divergence.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,52 +14,52 @@ namespace palpate {
 
 struct StepperOptions {
   double time_step = 0.001;  ///< h [s]
-  ImplicitOptions scheme{};  ///< the integrator, of explicit ones too
+  ImplicitOptions scheme{};  ///< integrator, also an explicit one
   std::vector<Wall> walls{};
 };
 
-/// What a step did.
+/// Result of a step.
 struct LiveReport {
-  bool whole = true;   ///< else it diverged in the shortest steps too: the body was stopped where it was
-  int parts = 1;       ///< steps that it was cut into as it diverged, or where the body had become too stiff
-  int newton = 0;      ///< steps of Newton's method in all parts
-  Index inverted = 0;  ///< most quadrature points on its way
-  Index contacts = 0;  ///< nodes that a wall pushes
-  FlowSums flow{};     ///< plastic flow
-  double limit = 0.0;  ///< explicit: longest stable step by the last look [s]; else infinity
-  bool is_near = false;  ///< explicit: the step is above nine tenths of the limit
+  bool whole = true;     ///< false: it diverged in the shortest steps too, and the body was stopped
+  int parts = 1;         ///< parts of a divided step: it diverged, or the body became too stiff
+  int newton = 0;        ///< Newton steps in all parts
+  Index inverted = 0;    ///< largest number of inverted quadrature points during the step
+  Index contacts = 0;    ///< nodes pushed by a wall
+  FlowSums flow{};       ///< plastic flow
+  double limit = 0.0;    ///< explicit: longest stable step at the last check [s]; else infinity
+  bool is_near = false;  ///< explicit: the step exceeds nine tenths of the limit
 };
 
-/// How often what has happened.
+/// Counts of events during all steps.
 struct LiveCounts {
   std::int64_t steps = 0;
-  std::int64_t halved = 0;      ///< steps that were cut
-  std::int64_t stopped = 0;     ///< steps that diverged however short
-  std::int64_t inverted = 0;    ///< steps in which elements were inverted
-  Index most_inverted = 0;      ///< quadrature points in a step
+  std::int64_t halved = 0;      ///< divided steps
+  std::int64_t stopped = 0;     ///< steps that diverged at any length
+  std::int64_t inverted = 0;    ///< steps with inverted elements
+  Index most_inverted = 0;      ///< most inverted quadrature points in a step
   std::int64_t near_limit = 0;  ///< explicit: steps above nine tenths of the stable one
   double plastic_work = 0.0;    ///< [J]
 
   void add(const LiveReport& report) noexcept;
 };
 
-/// Steps of one length. Explicit ones are refused where they are longer than is stable, watched while the
-/// body stiffens, and cut then; implicit ones are cut where Newton's method does not get there.
+/// Steps of fixed length. Unstable explicit steps are refused, and checked and divided as the body stiffens;
+/// implicit steps are divided if Newton's method does not converge.
 class LiveStepper {
  public:
-  /// Throws Error for a step that is not positive, for explicit steps longer than is stable at rest (with the
-  /// limit), for walls without sense.
+  /// Throws Error if the step is not positive, an explicit step is unstable at rest (with the limit), or a
+  /// wall is invalid.
   LiveStepper(const LiveBody& body, const StepperOptions& options);
 
-  /// One step under `push` [d N] beside the body's load [N]; empty: none.
+  /// Performs one step under `push` [d N] in addition to the body's load [N]; empty: none.
   LiveReport step(LiveState& state, const Eigen::VectorXd& push = {});
 
   [[nodiscard]] const LiveBody& body() const noexcept { return body_; }
   [[nodiscard]] const StepperOptions& options() const noexcept { return options_; }
   [[nodiscard]] const LiveCounts& counts() const noexcept { return counts_; }
-  /// The longest stable step at rest [s]: infinity of implicit integrators.
+  /// Longest stable step at rest [s]; infinity for implicit integrators.
   [[nodiscard]] double limit_at_rest() const noexcept { return limit_at_rest_; }
-  /// The factor of the last implicit step.
+  /// Factor of the last implicit step.
   [[nodiscard]] const TangentSolver& solver() const noexcept { return implicit_.solver(); }
   [[nodiscard]] const WallContacts& contacts() const noexcept { return implicit_.contacts(); }
 
@@ -82,7 +82,7 @@ class LiveStepper {
   Eigen::VectorXd forces_;  // [d N]
 };
 
-/// f [d N] += -C_d v, the damping forces of a body at positions x [N].
+/// Adds the damping forces -C_d v of a body at positions x to f [d N] [N].
 void add_damping_forces(const LiveBody& body, const Eigen::VectorXd& x, const Eigen::VectorXd& v,
                         std::span<const Mat3> plastic, Eigen::VectorXd& f);
 

@@ -1,4 +1,4 @@
-// How a body keeps its dents (Parker & O'Brien 2009; theory.md section 7).
+// Plastic flow, by which a body keeps dents (Parker & O'Brien 2009; theory.md section 7).
 #pragma once
 
 #include <Eigen/Core>
@@ -8,16 +8,16 @@
 
 namespace palpate {
 
-/// What flowed in a step.
+/// Plastic flow in a step.
 struct FlowSums {
-  double work = 0.0;  ///< plastic work: what the elastic energy loses as it flows [J]
-  Index flowing = 0;  ///< quadrature points above the yield
+  double work = 0.0;  ///< plastic work: loss of elastic energy by flow [J]
+  Index flowing = 0;  ///< quadrature points above the yield strain
 };
 
-/// One step of flow in `time` [s] at positions x [d N]: at each quadrature point whose elastic strain is
-/// above the yield y, plastic strain grows by c (|e| - y) / |e| e with c = 1 - exp(-creep time), so that what
-/// is above the yield dies away at the rate `creep` however long the steps are; then it is scaled back to its
-/// maximum. `plastic` strain of each point.
+/// Performs one step of flow in `time` [s] at positions x [d N]. At each quadrature point whose elastic
+/// strain exceeds the yield strain y, plastic strain grows by c (|e| - y) / |e| e with c = 1 - exp(-creep
+/// time), so that the excess decays at the rate `creep` for any step length; it is then scaled back to its
+/// maximum. `plastic`: plastic strain of each point.
 FlowSums flow(const LiveBody& body, const Eigen::VectorXd& x, double time, std::span<Mat3> plastic);
 
 }  // namespace palpate

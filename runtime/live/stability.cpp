@@ -9,7 +9,7 @@ namespace palpate {
 
 LargestFrequency::LargestFrequency(const LiveBody& body)
     : body_(body), K_(body.pattern().zero()), shape_(body.free_dofs()), root_mass_(body.free_dofs()) {
-  std::mt19937 random(1);  // a start that has something of every shape
+  std::mt19937 random(1);  // a start vector with a component of every shape
   std::uniform_real_distribution<double> entry(-1.0, 1.0);
   for (Index k = 0; k < body.free_dofs(); ++k) {
     shape_[k] = entry(random);

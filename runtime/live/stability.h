@@ -1,4 +1,4 @@
-// How long an explicit step of a body may be.
+// Stability limit of a body's explicit steps.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,14 +9,14 @@
 
 namespace palpate {
 
-/// The largest angular frequency of a body at some positions, by power iteration on M^-1 K. Goes on where it
-/// was, so that a few rounds follow a body that moves.
+/// Largest angular frequency of a body at given positions, by power iteration on M^-1 K. It continues from
+/// the last vector, so that a few iterations suffice for a moving body.
 class LargestFrequency {
  public:
   explicit LargestFrequency(const LiveBody& body);
 
-  /// `rounds` more at positions x [d N] with plastic strain (empty: none): an estimate from below [rad/s],
-  /// which is within a percent after a hundred rounds at most bodies.
+  /// Performs `rounds` more iterations at positions x [d N] with plastic strain (empty: none). Returns a
+  /// lower estimate [rad/s], which for most bodies is within a percent after a hundred iterations.
   double estimate(const Eigen::VectorXd& x, std::span<const Mat3> plastic, int rounds);
 
  private:
@@ -26,7 +26,7 @@ class LargestFrequency {
   Eigen::VectorXd root_mass_;  // [n]
 };
 
-/// The longest stable step [s] at an angular frequency of the body [rad/s], with its damping.
+/// Longest stable step [s] at an angular frequency of the body [rad/s], with its damping.
 double longest_step_at(const LiveBody& body, Integrator integrator, double omega);
 
 }  // namespace palpate

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Eigen::Index columns_at_once = 64;
 
-/// What the end of an explicit step moves by, of h^2 times the acceleration where it begins.
+/// Displacement of the end of an explicit step, as a fraction of h^2 times the initial acceleration.
 double explicit_share(Integrator integrator) noexcept {
   switch (integrator) {
     case Integrator::semi_implicit_euler:

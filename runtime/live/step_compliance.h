@@ -1,4 +1,4 @@
-// By how much a body moves within a time step with the forces in it.
+// Compliance of a body within a time step.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,23 +10,23 @@
 
 namespace palpate {
 
-/// The compliance W [m/N] of one step between all dofs of some nodes: by how much the step's end moves with
-/// the forces in it. By implicit Euler (M / h^2 + C_d / h + K)^-1 with the tangent at some positions; by an
-/// explicit integrator what it makes of forces at the step's begin, a multiple of h^2 M^-1. Found some
-/// columns at a time, so that whoever steps a body can spread the work over steps.
+/// Compliance W [m/N] of one step between all dofs of some nodes: displacement of the end of the step per
+/// force during it. For implicit Euler (M / h^2 + C_d / h + K)^-1 with the tangent at given positions; for an
+/// explicit integrator a multiple of h^2 M^-1, for forces at the beginning of the step. Computed a few
+/// columns at a time, so that the caller can spread the work over several steps.
 class StepCompliance {
  public:
-  /// `body` must live as long; `nodes`: of the mesh.
+  /// `body` must outlive this; `nodes`: mesh nodes.
   StepCompliance(const LiveBody& body, const StepperOptions& stepper, std::span<const Index> nodes);
 
-  /// Factors the matrix of a step at positions x [d N] with plastic strain (empty: none). False where it is
+  /// Factorises the matrix of a step at positions x [d N] with plastic strain (empty: none). False if it is
   /// not positive definite.
   bool begin(const Eigen::VectorXd& x, std::span<const Mat3> plastic);
-  /// Finds so many columns more. True where all are found.
+  /// Computes the given number of further columns. True once all are computed.
   bool go_on(Index columns);
-  /// Finds all columns by so many threads, with the bits that `go_on` gives in pieces of 64.
+  /// Computes all columns on several threads, with the same bits as `go_on` in pieces of 64.
   void find_all(int jobs);
-  /// W, once all columns are found.
+  /// Returns W, once all columns are computed.
   [[nodiscard]] PackedGreens take() noexcept;
 
  private:
@@ -34,18 +34,18 @@ class StepCompliance {
 
   const LiveBody& body_;
   StepperOptions stepper_;
-  std::vector<Index> free_;  // [n] free dof of each dof, -1 where it is held
+  std::vector<Index> free_;  // [n] free dof of each dof, -1 if held
   LiveMatrix A_;
   double scale_ = 1.0;  // W = scale A^-1
   TangentSolver solver_;
   std::shared_ptr<double[]> packed_;
-  Eigen::Index found_ = 0;  // columns
+  Eigen::Index found_ = 0;  // computed columns
 };
 
-/// Whether a tool can be felt with the integrator: its steps end elsewhere by the forces in them.
+/// True if a tool can be felt with the integrator: the end of its step depends on the forces during it.
 bool answers_within_step(Integrator integrator) noexcept;
 
-/// Q W Q^T: the compliance of a body that has turned by Q, blocks of d dofs each. In double precision.
+/// Q W Q^T: compliance of a body rotated by Q, in blocks of d dofs. In double precision.
 PackedGreens turned(const PackedGreens& W, const Mat3& Q, int d);
 
 }  // namespace palpate

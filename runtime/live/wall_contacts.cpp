@@ -8,9 +8,9 @@
 namespace palpate {
 namespace {
 
-constexpr int most_rounds = 400;  // of the solver: no tick waits for it
+constexpr int most_rounds = 400;  // of the solver; no tick waits for it
 
-/// A normal and d - 1 tangents, in the plane within it. Columns.
+/// Returns the normal and d - 1 tangents as columns; in the plane the tangent lies in it.
 Mat3 frame_of(const Vec3& normal, int d) noexcept {
   Mat3 frame;
   const Vec3 first = d == 2 ? Vec3(-normal.y(), normal.x(), 0.0) : Vec3(normal.unitOrthogonal());
@@ -91,7 +91,8 @@ Eigen::MatrixXd WallContacts::directions() const {
   return J;
 }
 
-/// Fills the problem: W, what moves along the rows without any force, and the forces as they are for a guess.
+/// Fills the problem: W, the relative displacement along the rows without contact forces, and the present
+/// forces as a guess.
 void WallContacts::gather(const Eigen::MatrixXd& moved_by, const Eigen::MatrixXd& J, double ahead,
                           const Eigen::VectorXd& x) {
   const int d = body_.dimension();
@@ -130,7 +131,7 @@ bool WallContacts::solve(const TangentSolver& A, double ahead, Eigen::VectorXd& 
   return solved;
 }
 
-/// As `solve`, with the contacts that are known.
+/// Solves as `solve` does, for the known contacts.
 bool WallContacts::solve_found(const TangentSolver& A, double ahead, Eigen::VectorXd& x) {
   const int d = body_.dimension();
   const Eigen::MatrixXd J = directions();

@@ -1,4 +1,4 @@
-// Contact with walls in an implicit step: all nodes at once, through the inverse of the step's matrix.
+// Contact with walls in an implicit step: all nodes together, through the inverse of the step's matrix.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,34 +12,35 @@
 
 namespace palpate {
 
-/// Wall forces on a body within one step. Contacts are of free nodes (along every axis); each is solved for
-/// with Coulomb's law on what it moves in the step: r = b + W lambda, W = J A^-1 J^T (runtime/solve).
+/// Wall forces on a body within one step. Contacts are with nodes that are free along every axis; Coulomb's
+/// law is solved for their relative displacement in the step: r = b + W lambda, W = J A^-1 J^T
+/// (runtime/solve).
 class WallContacts {
  public:
-  /// Room for `most` contacts; where there are more, the deepest.
+  /// Capacity for `most` contacts; of more, the deepest are kept.
   WallContacts(const LiveBody& body, std::vector<Wall> walls, Index most = 200);
 
   [[nodiscard]] bool any_walls() const noexcept { return !walls_.empty(); }
   [[nodiscard]] const std::vector<Wall>& walls() const noexcept { return walls_; }
   [[nodiscard]] Index count() const noexcept { return static_cast<Index>(contacts_.size()); }
-  [[nodiscard]] Index closed() const noexcept;  ///< with a force
+  [[nodiscard]] Index closed() const noexcept;  ///< contacts with a force
 
-  /// Begins a step at positions x [d N]: no contacts.
+  /// Begins a step at positions x [d N], without contacts.
   void begin(const Eigen::VectorXd& x) noexcept;
 
-  /// Takes up nodes that are in a wall at positions x [d N]. True where there are new ones.
+  /// Adds nodes that are inside a wall at positions x [d N]. True if there are new ones.
   bool find(const Eigen::VectorXd& x);
 
-  /// Given x [d N] as it is by the forces so far, finds the forces with which it is to be, and moves x by
-  /// what they change, dx = A^-1 J^T dlambda; again where nodes are in a wall then that were not before.
-  /// `ahead`: x at the end of the step is as many times as far from its beginning as x is. False where the
-  /// contact solver did not get there.
+  /// Finds the wall forces for positions x [d N], which include the effect of the forces so far, and moves x
+  /// by the effect of their change, dx = A^-1 J^T dlambda; repeats if further nodes are inside a wall then.
+  /// `ahead`: (x at the end of the step - x at its beginning) / (x - x at its beginning). False if the
+  /// contact solver did not converge.
   bool solve(const TangentSolver& A, double ahead, Eigen::VectorXd& x);
 
   /// Adds the forces [d N] to f [N].
   void add_forces(Eigen::VectorXd& f) const noexcept;
 
-  /// The normal and the friction of the contact of a node that has a force; for what follows a step.
+  /// Contact of a node with a force, for use after a step.
   struct Contact {
     Index node;
     const Wall* wall;
@@ -56,7 +57,7 @@ class WallContacts {
 
   const LiveBody& body_;
   std::vector<Wall> walls_;
-  std::vector<Index> nodes_;  // that can touch
+  std::vector<Index> nodes_;  // nodes that can touch a wall
   Index most_;
   std::vector<Contact> contacts_;
   std::vector<bool> has_contact_;  // [nodes_ x walls]
@@ -66,7 +67,7 @@ class WallContacts {
   ConeSolver cone_solver_;
 };
 
-/// The part of x [d N] that is a node's [m].
+/// Part of x [d N] that belongs to a node [m].
 inline Vec3 node_part(const Eigen::VectorXd& x, int d, Index node) noexcept {
   Vec3 part = Vec3::Zero();
   part.head(d) = x.segment(Eigen::Index{d} * node, d);
