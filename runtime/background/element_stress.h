@@ -1,4 +1,4 @@
-// Stress in the interior, where all displacements are known.
+// Stress in the interior of a body with known displacements.
 #pragma once
 
 #include "formats/model.h"
@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// sigma = D (B u - eps_0) of the elements at each node of the mesh by the displacement u0 + u of all of
-/// them: the mean over the elements at the node, weighted by their volumes (theory.md section 6).
+/// Returns the stress sigma = D (B u - eps_0) of the elements at each mesh node for the displacement u0 + u
+/// of all nodes: the mean over the elements at the node, weighted by volume (theory.md section 6).
 StressRows element_stress(const Model& model);
 
 }  // namespace palpate

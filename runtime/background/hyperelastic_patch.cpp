@@ -16,9 +16,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int most_cuts = 30;
-constexpr double least_fall = 1e-4;  // of what the slope promises
+constexpr double least_fall = 1e-4;  // fraction of the decrease predicted by the slope
 
-/// The fine mesh as a live body that nothing holds.
+/// The fine mesh as a live body without supports.
 LiveInput input_of(const Model& model, const PatchMesh& mesh) {
   LiveInput input{.mesh = mesh.local,
                   .analysis = model.analysis,
@@ -29,7 +29,7 @@ LiveInput input_of(const Model& model, const PatchMesh& mesh) {
   return input;
 }
 
-/// The stiffness [d g x d g] that the body's own elements of the patch have; zero where nodes are held.
+/// Stiffness [d g x d g] of the body's own elements in the patch; zero for held nodes.
 MatrixXd linear_stiffness(const Model& model, const PatchMesh& patch) {
   const auto d = static_cast<Eigen::Index>(model.dimension());
   MatrixXd K = MatrixXd::Zero(d * std::ssize(patch.nodes), d * std::ssize(patch.nodes));
@@ -38,7 +38,7 @@ MatrixXd linear_stiffness(const Model& model, const PatchMesh& patch) {
         model.materials[static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)])];
     const ElementMatrix K_e = element_stiffness(model.mesh.element, element_nodes(model.mesh, e),
                                                 elasticity_matrix(material, model.analysis), model.thickness);
-    std::vector<Eigen::Index> place;  // of the element's dofs, -1 where held
+    std::vector<Eigen::Index> place;  // dof of the patch for each of the element, -1 if held
     for (const Index node : model.mesh.element_nodes(e)) {
       const auto found = std::lower_bound(patch.nodes.begin(), patch.nodes.end(), node);
       const bool is_in = found != patch.nodes.end() && *found == node;
@@ -57,7 +57,7 @@ MatrixXd linear_stiffness(const Model& model, const PatchMesh& patch) {
   return K;
 }
 
-/// Xi_QQ^-1, with a stiffness of its own for dofs that are held: nothing couples to them.
+/// Xi_QQ^-1, with an arbitrary uncoupled stiffness for held dofs.
 MatrixXd stiffness_at(const Body& body, std::span<const Index> stored) {
   MatrixXd greens = greens_at(body, stored);
   greens = 0.5 * (greens + greens.transpose()).eval();
@@ -153,12 +153,12 @@ HyperelasticPatch::Look HyperelasticPatch::look(const Place& place, const Load& 
   return at;
 }
 
-/// Condenses the tangent where the patch is, with forces [d local nodes] beside it.
+/// Condenses the tangent at the present state, with forces [d local nodes] beside it.
 bool HyperelasticPatch::set_tangent(const VectorXd& forces) {
   const VectorXd x = at_rest_ + displacement(place_), f = free_part(forces);
   for (const TangentKind kind : {TangentKind::exact, TangentKind::positive}) {
     assemble_tangent(live_, x, {}, kind, K_);
-    if (kind == TangentKind::positive) {  // what is clamped may be singular
+    if (kind == TangentKind::positive) {  // the positive part may be singular
       for (const Index place : live_.pattern().diagonal()) K_.valuePtr()[place] *= 1.0 + 1e-8;
     }
     if (!condensation_.set(K_, f)) continue;
@@ -168,7 +168,7 @@ bool HyperelasticPatch::set_tangent(const VectorXd& forces) {
   return false;
 }
 
-/// Newton's step. False where there is none.
+/// Computes the Newton step. False if there is none.
 bool HyperelasticPatch::direction(const Look& look, Place& step) {
   const Eigen::Index local = at_rest_.size();
   VectorXd left = VectorXd::Zero(local);
@@ -207,7 +207,7 @@ PatchBalance HyperelasticPatch::find(std::span<const Index> surface_nodes, std::
     for (int cut = 0; cut <= most_cuts && !is_lower; ++cut, share *= 0.5) {
       tried = {place_.u_Q + share * step.u_Q, place_.u_L + share * step.u_L};
       there = look(tried, load);
-      // Near the end rounding hides the energy, and the forces tell.
+      // Near convergence the energy is lost in rounding, and the forces decide.
       is_lower = there.energy <= now.energy - least_fall * share * slope ||
                  std::hypot(there.left_Q.norm(), there.left_L.norm()) < 0.5 * before;
       report.cuts += is_lower ? 0 : 1;

@@ -10,12 +10,12 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t most_dofs = 3000;  // a larger W takes hundreds of megabytes, and seconds
-constexpr Index slice = 24;               // columns a step: about the work of a factorisation
+constexpr Index slice = 24;               // columns per step: about the work of a factorisation
 constexpr Index plane_slice = 96;         // in the plane, where factors are small and all nodes are stored
-constexpr int least_steps = 10;           // from one renewal to the next
+constexpr int least_steps = 10;           // steps between renewals
 constexpr double most_change = 0.02;      // of deformation gradients, root mean square
 constexpr double least_change = 0.002;    // below it, W is wrong for other reasons
-constexpr double most_error = 0.02;       // share of the force
+constexpr double most_error = 0.02;       // fraction of the force
 constexpr double most_turn = 0.05;        // [rad]
 
 bool can_renew(const Body& body) {
@@ -72,7 +72,7 @@ void LiveCompliance::look(const LiveState& state, Shape& shape) const {
   shape.R = live_.dimension() == 2 ? nearest_rotation_in_plane(mean) : nearest_rotation(mean);
 }
 
-/// Root mean square of F' - Q F, with Q the rotation that W takes from one to the other.
+/// Root mean square of F' - Q F, with Q the rotation of W between the two.
 double LiveCompliance::change(const Shape& from, const Shape& to) const {
   const Mat3 Q = to.R * from.R.transpose();
   double sum = 0.0, volume = 0.0;
@@ -95,7 +95,7 @@ bool LiveCompliance::follow(const LiveState& state, double error) noexcept {
   try {
     return go_on(state, error);
   } catch (const std::exception&) {
-    renews_ = false;  // there is no memory: W stays as it is
+    renews_ = false;  // out of memory: W is kept
     return false;
   }
 }

@@ -1,4 +1,4 @@
-// The compliance of a live body, renewed as it deforms and turns.
+// Compliance of a live body, renewed as it deforms and rotates.
 #pragma once
 
 #include <memory>
@@ -10,23 +10,23 @@
 
 namespace palpate {
 
-/// A live body at rest as the tick has it: under its loads.
+/// State of a live body at rest under its loads, as used by the tick.
 LiveState state_at_rest(const Body& body);
 
-/// What ticks have of a live body between its steps: the compliance W of one step. It begins as that of the
-/// body at rest (Body::greens). Where the body has deformed, or W is found to be wrong, the tangent where the
-/// body is then is factored, and W found from it in slices, one a step. A body that nothing holds takes W
-/// with it as it turns, by the rotation in its mean deformation gradient. Old ones live on until the tick and
-/// whoever shows the surface have let go of them: none is freed by a tick.
+/// Local model of a live body between its steps: the compliance W of one step. It starts as that of the body
+/// at rest (Body::greens). Once the body has deformed, or W is found to be wrong, the tangent at the present
+/// state is factorised and W computed from it in slices, one per step. The W of a body without supports is
+/// rotated with it, by the rotation in its mean deformation gradient. Old ones live until the tick and all
+/// displays of the surface have released them, so that the tick frees none.
 class LiveCompliance {
  public:
-  /// `body` must have a live one, and live as long. Without `renews`, W stays that of the body at rest.
+  /// `body` must have a live one, and outlive this. Without `renews`, W stays that of the body at rest.
   LiveCompliance(const Body& body, bool renews);
 
-  /// Back to the body at rest.
+  /// Resets to the body at rest.
   void rest() noexcept;
-  /// After a step that ended in `state`: does a slice of the work. `error`: by how much W was wrong in it, as
-  /// a share of the force. True where W is another now.
+  /// Performs a slice of the work after a step that ended in `state`. `error`: error of W in that step, as a
+  /// fraction of the force. Returns true if W has changed.
   bool follow(const LiveState& state, double error) noexcept;
 
   /// W; null for that of the body at rest.
@@ -34,13 +34,13 @@ class LiveCompliance {
   [[nodiscard]] const Greens& now() const noexcept {
     return renewed_ != nullptr ? *renewed_ : body_.greens();
   }
-  /// The body's time when the tangent of W was factored [s].
+  /// Time of the body at which the tangent of W was factorised [s].
   [[nodiscard]] double factored() const noexcept { return at_.time; }
-  [[nodiscard]] std::int64_t renewals() const noexcept { return renewals_; }  ///< factored ones that came
-  [[nodiscard]] std::int64_t turns() const noexcept { return turns_; }        ///< turned ones
+  [[nodiscard]] std::int64_t renewals() const noexcept { return renewals_; }  ///< renewals from a new factor
+  [[nodiscard]] std::int64_t turns() const noexcept { return turns_; }        ///< renewals by rotation
 
  private:
-  /// How a body is deformed.
+  /// Deformation of a body.
   struct Shape {
     std::vector<Mat3> F;  // [quadrature points]
     Mat3 R = Mat3::Identity();
@@ -55,14 +55,14 @@ class LiveCompliance {
 
   const Body& body_;
   const LiveBody& live_;
-  bool renews_;  // else W stays as it is
+  bool renews_;  // false: W is never renewed
   bool turns_with_body_;
   StepCompliance maker_;
   bool is_making_ = false;
-  int steps_since_ = 0;    // W came last
-  Shape at_, next_, now_;  // where W was factored, where the one in the making, after the last step
+  int steps_since_ = 0;    // steps since the last renewal of W
+  Shape at_, next_, now_;  // at the factorisation of W, at that of the next W, and after the last step
   Mat3 R_delivered_ = Mat3::Identity();
-  PackedGreens W_;  // as it was factored; empty for that of the body at rest
+  PackedGreens W_;  // as factorised; empty for that of the body at rest
   std::shared_ptr<const Greens> renewed_;
   std::vector<std::shared_ptr<const Greens>> kept_;
   std::int64_t renewals_ = 0, turns_ = 0;

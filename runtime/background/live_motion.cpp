@@ -23,10 +23,10 @@ double measured_step(const Body& body) {
   body.greens().gather(node, {&node, 1}, std::span(block).first(static_cast<std::size_t>(d * d)));
   Eigen::VectorXd push = Eigen::VectorXd::Zero(live.dofs());
   push[Eigen::Index{d} * body.mesh_node(node)] = 0.01 * body.mean_surface_edge() / block[0];
-  stepper.step(state, push);  // finds the order of elimination too
+  stepper.step(state, push);  // also computes the elimination order
   const auto begin = std::chrono::steady_clock::now();
-  stepper.step(state, push);  // with the forces that the tick found
-  stepper.step(state, push);  // and the one to come
+  stepper.step(state, push);  // with the forces of the tick
+  stepper.step(state, push);  // predicts the next step
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
@@ -46,7 +46,7 @@ LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
   predict();
 }
 
-/// The step to come, under the forces of the last one.
+/// Predicts the next step, under the forces of the last one.
 void LiveMotion::predict() noexcept {
   predicted_ = state_;
   predicted_report_ = stepper_.step(predicted_, push_);
@@ -100,9 +100,9 @@ void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcep
   }
 }
 
-/// Where the nodes would be without the tool: as it found them, held ones in their place. A body that nothing
-/// holds has moved since, by the rigid motion that is nearest (Horn 1987) to that of the half of its nodes
-/// which is far from the tool.
+/// Computes the positions of the nodes without the tool: as they were before it touched, held ones at their
+/// prescribed position. For a body without supports, its motion since then is included as the rigid motion
+/// (Horn 1987) closest to that of the half of its nodes that is farthest from the tool.
 void LiveMotion::follow_untouched() noexcept {
   if (push_.isZero(0.0)) {
     found_ = state_.x;
@@ -151,7 +151,8 @@ void LiveMotion::displace(const NodalLoad& load, std::vector<double>& u) const n
   if (!load.empty()) compliance_.now().displacement(load.nodes(), load.forces(), u);
 }
 
-/// Where the tick had the loaded nodes, against where they are. By how much the force is off, of it.
+/// Compares the positions of the loaded nodes in the tick with the actual ones. Returns the error of the
+/// force, as a fraction of it.
 double LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexcept {
   const int d = live_.dimension();
   double along = 0.0, by_compliance = 0.0, largest = 0.0;

@@ -1,4 +1,4 @@
-// A live body as a motion stepper.
+// Live body as a motion stepper.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,35 +12,35 @@
 
 namespace palpate {
 
-/// What is told of a live body: how its steps went, and how far the tick's local model of it was off.
+/// Report on a live body: its steps, and the error of the tick's local model.
 struct LiveTelling {
   LiveCounts counts;
-  double compliance_age = 0.0;  ///< time of the body since the compliance that ticks use was factored [s]
-  std::int64_t renewals = 0;    ///< times that it was factored anew
-  std::int64_t turns = 0;       ///< times that it was turned with the body
-  /// How far loaded nodes were at the end of a step from where the compliance had them, at most [m]; and of
-  /// the last.
+  double compliance_age = 0.0;  ///< time of the body since the factorisation of the tick's compliance [s]
+  std::int64_t renewals = 0;    ///< number of renewals from a new factor
+  std::int64_t turns = 0;       ///< number of rotations with the body
+  /// Distance of loaded nodes at the end of a step from their position by the compliance [m]: largest, and
+  /// that of the last step.
   double largest_error = 0.0;
   double last_error = 0.0;
-  /// What that makes of the tool's force, along the force: F (f . du) / (f . W f), at most; and of the last
-  /// [N].
+  /// Resulting error of the tool's force, along the force: F (f . du) / (f . W f) [N]: largest, and that of
+  /// the last step.
   double largest_force_error = 0.0;
   double last_force_error = 0.0;
-  /// The shortest of the longest stable steps on the way, of explicit integrators [s]; else infinity.
+  /// Smallest stability limit of explicit integrators so far [s]; else infinity.
   double step_limit = std::numeric_limits<double>::infinity();
-  double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
+  double largest_force = 0.0;  ///< largest sum of the forces on the body at the end of a step [N]
 };
 
-/// Time that the body of a live model takes for a step beside the tick, by a trial under a small push [s].
+/// Measures the computing time of a live model's step beside the tick, by a trial under a small force [s].
 double measured_step(const Body& body);
 
-/// Steps a live body. The tick meets x = x_p + W (f - f_p): x_p is the step with the forces f_p of the last
-/// one held, W the compliance of one step, which is renewed as the body changes (LiveCompliance). The forces
-/// f that the tick ends with do the step anew, without W; how far the two are apart is the error of the local
-/// model.
+/// Steps a live body. The tick uses x = x_p + W (f - f_p): x_p is the end of the step with the last forces
+/// f_p held, W the compliance of one step, which is renewed as the body changes (LiveCompliance). The step is
+/// then repeated with the forces f at the end of the tick, without W; the difference is the error of the
+/// local model.
 class LiveMotion final : public MotionStepper {
  public:
-  /// `body` must have a live one, and live as long.
+  /// `body` must have a live one, and outlive this.
   explicit LiveMotion(const Body& body, bool renews_compliance = true);
 
   void rest() noexcept override;
@@ -53,7 +53,7 @@ class LiveMotion final : public MotionStepper {
   void tell_untouched(std::vector<double>& u) const noexcept override;
   [[nodiscard]] const LiveState& state() const noexcept { return state_; }
 
-  [[nodiscard]] LiveTelling telling() const;  ///< from any thread
+  [[nodiscard]] LiveTelling telling() const;  ///< for any thread
 
  private:
   void put_on(const NodalLoad& load, Eigen::VectorXd& push) const noexcept;
@@ -67,14 +67,14 @@ class LiveMotion final : public MotionStepper {
   LiveStepper stepper_;
   LiveCompliance compliance_;
   LiveReport predicted_report_;
-  LiveState state_, predicted_;       // now; at the end of the step that is predicted
-  Eigen::VectorXd push_;              // [d N] forces with which it was predicted
+  LiveState state_, predicted_;       // present state; state at the end of the predicted step
+  Eigen::VectorXd push_;              // [d N] forces of the prediction
   std::vector<double> by_load_;       // [n] W f of the last job
   std::vector<double> by_last_load_;  // [n] W f_p
-  Eigen::VectorXd found_;             // [d N] where all nodes were when the tool was last away,
-  Eigen::VectorXd untouched_;  // [d N] and that moved along with the body, at the end of the predicted step
-  std::vector<Index> far_;     // [N] scratch: nodes in the order of their way from the tool
-  mutable std::mutex mutex_;   // of `telling_`
+  Eigen::VectorXd found_;             // [d N] positions of all nodes when the tool was last away,
+  Eigen::VectorXd untouched_;         // [d N] the same, moved with the body, at the end of the predicted step
+  std::vector<Index> far_;            // [N] workspace: nodes in the order of their distance from the tool
+  mutable std::mutex mutex_;          // guards telling_
   LiveTelling telling_;
 };
 

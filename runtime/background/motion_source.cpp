@@ -13,7 +13,7 @@ namespace {
 
 constexpr auto pause = std::chrono::microseconds(50);
 constexpr auto long_pause = std::chrono::milliseconds(1);  // while nothing moves
-constexpr std::size_t most_posted = 64;                    // jobs that a replay may be behind by
+constexpr std::size_t most_posted = 64;                    // jobs by which a replay may lag
 constexpr int patience = 2000;                             // pauses until then
 
 int processors_beside_the_tick() {
@@ -83,7 +83,7 @@ void MotionSource::post(State& state) noexcept {
   if (!in_background_) {
     const MotionJob& job = state.surface.motion.job();
     if (!posted_.empty() && job.step == posted_.back().step) return;
-    if (!posted_.empty() && job.step < posted_.back().step) posted_.clear();  // the state was set back
+    if (!posted_.empty() && job.step < posted_.back().step) posted_.clear();  // the state was reset
     if (posted_.size() == most_posted) posted_.pop_front();
     posted_.push_back(job);
     return;
@@ -110,7 +110,7 @@ void MotionSource::work() noexcept {
 
 void MotionSource::do_job(const MotionJob& job) noexcept {
   const auto begin = std::chrono::steady_clock::now();
-  if (job.step < done_) {  // the state was set back
+  if (job.step < done_) {  // the state was reset
     stepper_->rest();
     let_go_done_ = 0;
   }

@@ -9,10 +9,10 @@
 
 namespace palpate {
 
-/// Newmark's method by the packed inverse in the file.
+/// Newmark's method with the packed inverse from the file.
 class PackedMotion final : public MotionStepper {
  public:
-  /// `body` must live as long; `jobs` threads multiply. Throws Error unless the body's dynamics are packed.
+  /// `body` must outlive this; `jobs` threads multiply. Throws Error unless the body's dynamics are packed.
   PackedMotion(const Body& body, int jobs);
 
   void rest() noexcept override { newmark_.rest(); }
@@ -23,7 +23,7 @@ class PackedMotion final : public MotionStepper {
 
   const Body& body_;
   PackedNewmark newmark_;
-  std::vector<double> f_, u_, v_;  // [n] scratch
+  std::vector<double> f_, u_, v_;  // [n] workspace
   std::vector<std::int64_t> touched_;
 };
 

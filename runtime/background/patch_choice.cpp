@@ -8,8 +8,8 @@
 namespace palpate {
 namespace {
 
-/// How much a contact point tells where a tool touches: by how deep the device is in the body at rest there,
-/// squared.
+/// Weight of a contact point for locating the touch: the square of the depth of the device in the body at
+/// rest there.
 double share_of(const ContactPoint& contact) noexcept {
   if (contact.held) return 1.0;
   const double depth = std::max(0.0, -contact.free_gap);
@@ -41,7 +41,7 @@ PatchChoice::PatchChoice(const Body& body, const State& state)
       touched_(3 * body.most_surface_parts() * state.max_contacts()),
       share_(touched_.size()) {}
 
-/// Gives the nodes of the body that a surface node follows their parts of a share.
+/// Distributes a weight over the body's nodes that a surface node follows.
 void PatchChoice::add_share(const Body& body, Index surface_node, double share) noexcept {
   const SurfaceParts parts = body.surface_parts(surface_node);
   for (std::size_t p = 0; p < parts.stored.size(); ++p) {
@@ -56,7 +56,7 @@ void PatchChoice::add_share(const Body& body, Index surface_node, double share) 
   }
 }
 
-/// The node with the largest share, but the present one, where there is one, unless that has clearly less.
+/// Returns the node with the largest weight; the present one, if any, unless it has clearly less.
 Index PatchChoice::chosen(Index present) const noexcept {
   Index best = -1;
   double of_best = 0.0, of_present = 0.0, sum = 0.0;
@@ -108,7 +108,7 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
                         : -1;
 }
 
-/// The centres that the tools will want in some ticks.
+/// Predicts the centres that the tools will need in some ticks.
 PatchKey PatchChoice::key_at(const Body& body, const State& state, double ticks) noexcept {
   PatchKey key;
   for (std::size_t k = 0; k < tools_.size(); ++k) {

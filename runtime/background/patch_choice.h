@@ -1,4 +1,4 @@
-// Which overlays the tools want, now and soon.
+// Choice of the overlays that the tools need, now and soon.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// The centres of a patch, stored nodes, ascending; -1 behind the last.
+/// Centres of a patch: stored nodes, ascending; unused entries are -1.
 struct PatchKey {
   std::array<Index, most_overlay_tools> centres{-1, -1, -1, -1};
 
@@ -21,26 +21,26 @@ struct PatchKey {
   auto operator<=>(const PatchKey&) const = default;
 };
 
-/// What is wanted of overlays, the most urgent first, each once.
+/// Requested overlays, the most urgent first, without duplicates.
 struct PatchRequests {
   static constexpr std::size_t most = 8;
   std::array<PatchKey, most> keys{};
   std::size_t count = 0;
-  Vec3 direction = Vec3::Zero();  ///< in which the first tool moves, unit, or zero
+  Vec3 direction = Vec3::Zero();  ///< direction of the first tool's motion, unit vector or zero
 
   void add(const PatchKey& key) noexcept;
 };
 
-/// Follows the tools and tells where overlays belong: round the node of the body that has the largest part in
-/// the places where a tool is deepest in the body at rest, or that a free tool is nearest to. It changes to
-/// another node only when that one clearly has more, so that a tool on the border between two does not go to
-/// and fro. Forces have no say: beside a patch the body is stiffer and carries more, so that the patch would
-/// follow its own absence. All memory is taken at construction.
+/// Follows the tools and chooses the places of overlays: around the body's node with the largest weight where
+/// a tool is deepest in the body at rest, or nearest to a free tool. The centre changes only if another node
+/// has clearly more weight, so that a tool between two nodes does not switch back and forth. Forces are not
+/// used: outside a patch the body is stiffer and carries more, so the patch would move away from where it is
+/// needed. All memory is allocated at construction.
 class PatchChoice {
  public:
   PatchChoice(const Body& body, const State& state);
 
-  /// By the tick before. Looks ahead to one time a tick, in turn.
+  /// Updates the choice from the last tick. Each tick looks ahead to one time, in turn.
   void follow(const Body& body, const State& state) noexcept;
 
   [[nodiscard]] const PatchKey& now() const noexcept { return now_; }  ///< empty while no tool is near
@@ -49,7 +49,7 @@ class PatchChoice {
  private:
   struct Followed {
     Index centre = -1;
-    Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m a tick]
+    Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m/tick]
   };
 
   void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;
@@ -59,15 +59,15 @@ class PatchChoice {
   void add_share(const Body& body, Index surface_node, double share) noexcept;
   [[nodiscard]] Index chosen(Index present) const noexcept;
 
-  double reach_;  // how far from the body overlays are made for a tool [m]
+  double reach_;  // distance from the body within which a tool gets overlays [m]
   std::int64_t ticks_ = 0;
   std::vector<Followed> tools_;
-  // Scratch of a choice.
+  // Workspace of a choice.
   std::size_t count_ = 0;
-  std::vector<Index> touched_;  // stored nodes that have a part in the places that count
-  std::vector<double> share_;   // and how much
+  std::vector<Index> touched_;  // stored nodes with a weight
+  std::vector<double> share_;   // their weights
   PatchKey now_;
-  std::array<PatchKey, tuning.patches.times_ahead.size()> ahead_;  // where the tools will be
+  std::array<PatchKey, tuning.patches.times_ahead.size()> ahead_;  // predicted centres
   PatchRequests requests_;
 };
 

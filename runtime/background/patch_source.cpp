@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t most_patches = 4096;
 constexpr auto request_pause = std::chrono::microseconds(500);
-constexpr std::int64_t tangent_stride = 5;  // ticks from one tangent to the next, without a builder
+constexpr std::int64_t tangent_stride = 5;  // ticks between tangents, without a builder
 
 }  // namespace
 
@@ -57,7 +57,7 @@ void PatchSource::serve(State& state) noexcept {
   if (!wanted.empty()) count(state);
 }
 
-/// Gives the builder the forces of the last tick. Without one, does its work.
+/// Posts the forces of the last tick to the builder; without one, does its work.
 void PatchSource::post_load(const State& state, const PatchKey& wanted) noexcept {
   if (!tangents_) return;
   PatchLoad& load = loads_.next();
@@ -74,12 +74,12 @@ void PatchSource::post_load(const State& state, const PatchKey& wanted) noexcept
   loads_.publish();
 }
 
-/// Where there is a patch by a tangent, it is used, also of another place, until there is one of this.
+/// Uses the latest patch from a tangent, even of another place, until there is one for this place.
 bool PatchSource::take_tangent(State& state, const PatchKey& wanted) noexcept {
   if (!tangents_) return false;
   std::shared_ptr<const Patch>& patch = state.surface.patch;
   const Tangent& tangent = delivered_tangents_.read();
-  if (tangent.patch == nullptr) {  // the last one is of forces that are no more
+  if (tangent.patch == nullptr) {  // the last one is for forces that have ended
     if (patch == nullptr || !patch->has_offset()) return false;
     const std::shared_ptr<const Patch>* linear = find(used_);
     patch = linear != nullptr ? *linear : nullptr;
@@ -94,7 +94,7 @@ bool PatchSource::take_tangent(State& state, const PatchKey& wanted) noexcept {
   return true;
 }
 
-/// False where the patch that is wanted is not there.
+/// Sets the requested linear patch. False if it is not available.
 bool PatchSource::take_linear(State& state, const PatchKey& wanted) noexcept {
   if (wanted == used_ && state.surface.patch != nullptr) return true;
   const std::shared_ptr<const Patch>* patch = find(wanted);
@@ -167,11 +167,11 @@ void PatchSource::build_wishes() {
   }
 }
 
-/// What is wished for first, then what the file has, then, while there is memory, round the first centre,
-/// those first that the tool moves towards.
+/// Builds requested patches first, then those in the file, then, while there is memory, patches around the
+/// first centre, in the direction of the tool first.
 bool PatchSource::build_next(const PatchRequests& requests) {
   const std::size_t usual = kept_.empty() ? 0 : bytes_ / kept_.size();
-  std::size_t wanted = 0;  // bytes of the requests so far: later ones must not push them out
+  std::size_t wanted = 0;  // bytes of the requests so far: later ones must not displace them
   for (std::size_t k = 0; k < requests.count && (k == 0 || wanted + usual <= options_.memory); ++k) {
     if (build(requests.keys[k])) return true;
     const std::shared_ptr<const Patch>& patch = kept_.at(requests.keys[k]).patch;
@@ -195,7 +195,7 @@ bool PatchSource::build_next(const PatchRequests& requests) {
   return false;
 }
 
-/// The next of the file's patches, in their order, as long as there is memory for them.
+/// Loads the next patch of the file, in order, as long as there is memory.
 bool PatchSource::build_stored() {
   const StoredOverlay& overlay = body_.model().overlay;
   while (next_stored_ < overlay.centres.size()) {
@@ -226,7 +226,7 @@ bool PatchSource::build(const PatchKey& key) {
   try {
     patch = maker_.make({key.centres.data(), static_cast<std::size_t>(key.count())});
   } catch (const std::exception&) {
-    ++failed_;  // it is not tried again, and the tick goes on without
+    ++failed_;  // not retried; the tick continues without it
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   longest_build_ = std::max<double>(longest_build_, took.count());
@@ -243,7 +243,7 @@ bool PatchSource::build(const PatchKey& key) {
   return true;
 }
 
-/// Goes on with the patch by a tangent under a load. False where nothing is to be done.
+/// Continues with the tangent patch under a load. False if there is nothing to do.
 bool PatchSource::follow_load(const PatchLoad& load) noexcept {
   if (!tangents_->follow(load)) return false;
   Tangent& next = delivered_tangents_.next();
@@ -253,8 +253,8 @@ bool PatchSource::follow_load(const PatchLoad& load) noexcept {
   return true;
 }
 
-/// Lets go of those that were not wanted for longest until the rest is within the budget. They are freed by a
-/// later `build`, after the tick and whoever shows the surface have let go of them too.
+/// Removes the patches that have not been wanted for longest until the rest is within the budget. A later
+/// `build` frees them, once the tick and all displays have released them too.
 void PatchSource::make_room() {
   while (bytes_ > options_.memory || free_slots_.empty()) {
     auto oldest = kept_.end();

@@ -8,10 +8,10 @@
 namespace palpate {
 namespace {
 
-// One step: that is where the tick's contact, by the last tangent, has the surface. Further steps under
-// forces that stay as they are lead away from a contact that is steady and would not be under such forces.
+// One step: it ends where the tick's contact, by the last tangent, has the surface. Further steps under
+// constant forces lead away from a steady contact, whose forces would not stay constant.
 constexpr PatchEffort patch_effort{.tolerance = 1e-8, .most_steps = 1};
-constexpr double no_change = 1e-6;  // of forces: what the tangent then leaves out is its square
+constexpr double no_change = 1e-6;  // of forces: the tangent's error is its square
 
 }  // namespace
 
@@ -32,8 +32,8 @@ bool PatchTangents::follow(const PatchLoad& load) noexcept {
     if (load.by != patch_.get() && patch_ != nullptr && load.key == key_) return false;
     if (is_settled(load)) return false;
     make(load);
-  } catch (const std::exception&) {  // there is no memory, or the elements are too flat: the tick goes on
-    is_balanced_ = true;             // without, and it is not tried again for these forces
+  } catch (const std::exception&) {  // out of memory or too flat elements: the tick continues without
+    is_balanced_ = true;             // these forces are not retried
     patch_ = nullptr;
     const std::lock_guard lock(mutex_);
     ++telling_.failed;

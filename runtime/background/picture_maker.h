@@ -1,4 +1,4 @@
-// The picture of the surface that follows from the forces on it.
+// Pictures of the surface computed from the forces on it.
 #pragma once
 
 #include <span>
@@ -12,40 +12,40 @@
 
 namespace palpate {
 
-/// Whether all of a picture follows from contact forces alone: the body's Green's functions move it, without
-/// dynamics, warp or overlay.
+/// True if a picture follows from the contact forces alone: the body is displaced by its Green's functions,
+/// without dynamics, warp or overlay.
 [[nodiscard]] bool pictures_follow_from_contacts(const Body& body) noexcept;
 
-/// What a closed contact point presses a surface node with along its normal [N].
+/// Normal force of a closed contact point on a surface node [N].
 struct NodalPress {
   Index node = -1;
   double force = 0.0;
 };
 
-/// A force on the body at a surface node [N].
+/// Force on the body at a surface node [N].
 struct NodalForce {
   Index node = -1;
   Vec3 force = Vec3::Zero();
 };
 
-/// These in short: each node once.
+/// Combines them into loads without duplicate nodes.
 [[nodiscard]] ContactLoads contact_loads(std::span<const NodalForce> forces,
                                          std::span<const NodalPress> presses);
 
 /// Computes displacement, von Mises stress and contact pressure of all surface nodes.
 class PictureMaker {
  public:
-  /// `body` must live as long.
+  /// `body` must outlive this.
   explicit PictureMaker(const Body& body);
 
-  /// What a frame shows of the forces of a tick, but for its time; `motion`: as of surface_displacement.
+  /// Computes a frame from the forces of a tick, except its time; `motion`: see surface_displacement.
   void show(const SurfaceLoad& load, const MotionSnapshot* motion, std::span<const NodalForce> forces,
             std::span<const NodalPress> presses, SurfaceFrame& frame);
   /// [n] displacement of the stored nodes in the last picture [m].
   [[nodiscard]] std::span<const double> stored_displacement() const noexcept { return stored_; }
 
-  /// The picture of a recording, of a body of which `pictures_follow_from_contacts`. Throws Error where a
-  /// node is none of the surface.
+  /// Returns a picture of a recording, for a body with `pictures_follow_from_contacts`. Throws Error if a
+  /// node is not on the surface.
   [[nodiscard]] SurfaceFrame picture(const ContactLoads& loads);
 
  private:
@@ -57,7 +57,7 @@ class PictureMaker {
   std::vector<double> stored_;  // [n]
   std::vector<Vec3> u_;         // [S] u, then u0 + u
   SurfaceStress stress_;
-  std::vector<Vec3> force_;           // [S] of the contacts
+  std::vector<Vec3> force_;           // [S] contact forces
   std::vector<Stress> nodal_stress_;  // [S]
 };
 

@@ -5,7 +5,7 @@
 namespace palpate {
 namespace {
 
-/// Where the surface is now at a contact.
+/// Position of the deformed surface at a contact.
 Vec3 surface_position(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   Vec3 position = Vec3::Zero();
   for_each_node(body, state.surface.near, contact,
@@ -13,7 +13,7 @@ Vec3 surface_position(const Body& body, const State& state, const ContactPoint& 
   return position;
 }
 
-/// The normal of a sphere that slides without friction has turned within the tick, and its force with it.
+/// For a sphere without friction, the normal and the force have rotated within the tick.
 Vec3 normal_of(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   if (contact.held) return outward_normal(state.surface.tree, nodes_of(body, contact.simplex));
   if (contact.rolls && !contact.force.isZero(0.0)) return contact.force.normalized();

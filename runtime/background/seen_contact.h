@@ -1,4 +1,4 @@
-// A contact point as it is seen.
+// Contact point for display.
 #pragma once
 
 #include "runtime/tick/state.h"
@@ -6,14 +6,14 @@
 namespace palpate {
 
 struct SeenContact {
-  Vec3 position;  ///< of the surface now [m]
-  Vec3 normal;    ///< outward
-  Vec3 force;     ///< on the body [N]
+  Vec3 position;  ///< on the deformed surface [m]
+  Vec3 normal;    ///< outward normal
+  Vec3 force;     ///< force on the body [N]
   bool held = false;
 };
 
-/// A contact point of the last tick as the viewer draws it. The normal of one that a grab holds is that of
-/// its simplex as it is now.
+/// Returns a contact point of the last tick for display. The normal of one held by a grab is that of its
+/// deformed simplex.
 SeenContact seen_contact(const Body& body, const State& state, const ContactPoint& contact) noexcept;
 
 }  // namespace palpate

@@ -9,16 +9,16 @@
 namespace palpate {
 namespace {
 
-const double smooth = std::cos(M_PI / 6.0);  // of the angle between the normals of facets on one side
-constexpr double shear_cost = 100.0;         // times that of pressure, where a force is shared out
-constexpr int most_rounds = 5;               // on bodies all edges, that rows stay short
-constexpr std::size_t most_alone = 3;        // sides that are told apart of those without a node beside
+const double smooth = std::cos(M_PI / 6.0);  // cosine of the largest angle between adjacent facets of a side
+constexpr double shear_cost = 100.0;         // relative to pressure, when a force is distributed
+constexpr int most_rounds = 5;               // on most bodies all edges are done, with short rows
+constexpr std::size_t most_alone = 3;        // sides treated separately among those without inner nodes
 
 std::size_t index(Index number) {
   return static_cast<std::size_t>(number);
 }
 
-/// Facets at each node, one after another: [nodes + 1] and the places in facet_nodes.
+/// Facets at each node, concatenated: offsets [nodes + 1] and indices into facet_nodes.
 struct FacetsAtNodes {
   FacetsAtNodes(std::size_t nodes, std::span<const Index> facet_nodes)
       : first(nodes + 1), entry(facet_nodes.size()) {
@@ -33,14 +33,14 @@ struct FacetsAtNodes {
   std::vector<std::size_t> first, entry;
 };
 
-/// Whether two facets at a node are beside each other there: lines always are.
+/// True if two facets at a node are adjacent there; lines always are.
 bool are_neighbours(std::span<const Index> a, std::span<const Index> b, Index node) {
   return a.size() == 2 || std::any_of(a.begin(), a.end(), [&](Index other) {
            return other != node && std::find(b.begin(), b.end(), other) != b.end();
          });
 }
 
-/// Traction at a place by forces on nodes.
+/// Traction at a place as a function of nodal forces.
 using Row = std::map<Index, Mat3>;
 
 void add(const Row& row, const Mat3& factor, Row& to) {
@@ -50,7 +50,7 @@ void add(const Row& row, const Mat3& factor, Row& to) {
   }
 }
 
-/// Gives each place at an edge its row, from the sides' inner nodes outwards.
+/// Computes the row of each place at an edge, from the inner nodes of the sides outwards.
 class EdgeRows {
  public:
   EdgeRows(const SurfaceSides& sides, const std::vector<double>& area)
@@ -108,7 +108,7 @@ class EdgeRows {
     return std::min(most_alone, static_cast<std::size_t>(count));
   }
 
-  /// Mean of the nodes beside that are done.
+  /// Mean of the adjacent places that are done.
   [[nodiscard]] Row mean_beside(Index place) const {
     Row mean;
     double count = 0.0;
@@ -151,7 +151,7 @@ class EdgeRows {
   std::vector<Row> rows_;                       // [places]
   std::vector<std::uint8_t> done_;              // [places]
   std::vector<std::vector<Index>> beside_;      // [places] of those at edges
-  std::map<Index, std::vector<Index>> places_;  // of each node where sides meet, with an area
+  std::map<Index, std::vector<Index>> places_;  // places with an area, of each node where sides meet
 };
 
 }  // namespace
@@ -170,7 +170,7 @@ SurfaceSides::SurfaceSides(std::size_t nodes, std::span<const Index> facet_nodes
   for (std::size_t node = 0; node < nodes; ++node) {
     const std::span<const std::size_t> here = facets.of(node);
     auto place = static_cast<Index>(node);
-    std::vector<std::size_t> side;  // being followed from facet to facet
+    std::vector<std::size_t> side;  // facet indices of the side being traversed
     for (const std::size_t begin : here) {
       if (place_[begin] >= 0) continue;
       if (begin != here.front()) {

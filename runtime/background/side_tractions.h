@@ -1,4 +1,4 @@
-// From forces on the nodes of a surface to the tractions of its sides.
+// Tractions on the sides of a surface from nodal forces.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,13 @@
 
 namespace palpate {
 
-/// The smooth sides that meet at each node of a surface: facets round it are on one side where their normals
-/// turn by less than 30 degrees from one to the next. A node has one place for each of its sides, and a
-/// traction for each place. The first place of a node has the node's number, the others follow after all
-/// nodes.
+/// Smooth sides that meet at each node of a surface: adjacent facets belong to one side if their normals
+/// differ by less than 30 degrees. A node has one place for each of its sides, with a traction each. The
+/// first place of a node has the node's number; further ones are numbered after all nodes.
 class SurfaceSides {
  public:
   /// `facet_nodes` [F x width] with unit normals [F]; lines in the plane, else triangles or quads, with or
-  /// without middle nodes.
+  /// without mid-side nodes.
   SurfaceSides(std::size_t nodes, std::span<const Index> facet_nodes, std::span<const Vec3> facet_normals);
 
   [[nodiscard]] std::size_t places() const noexcept { return node_.size(); }
@@ -26,9 +25,9 @@ class SurfaceSides {
   /// [F x width] place of each node of each facet.
   [[nodiscard]] std::span<const Index> places_of_facets() const noexcept { return place_; }
   [[nodiscard]] Index node(Index place) const noexcept { return node_[place]; }
-  /// Whether several sides meet at a node.
+  /// True if several sides meet at a node.
   [[nodiscard]] bool is_creased(Index node) const noexcept { return is_creased_[node] != 0; }
-  /// Mean of the facets' normals at a place, unit.
+  /// Mean normal of the facets at a place, unit vector.
   [[nodiscard]] const Vec3& normal(Index place) const noexcept { return normal_[place]; }
 
  private:
@@ -40,21 +39,21 @@ class SurfaceSides {
   std::vector<std::uint8_t> is_creased_;  // [nodes]
 };
 
-/// Tractions of the sides as linear functions of the forces on the nodes. Inside a side a node's force is
-/// spread over its area. At an edge one force is that of several sides: each has the traction that its nodes
-/// beside have in the mean, and what is left of the force becomes rather pressure than shear of all of them
-/// (or of those that have no node beside). So tractions that are even on each side are found exactly.
+/// Tractions of the sides as linear functions of nodal forces. Inside a side a node's force is distributed
+/// over its area. At an edge one force belongs to several sides: each gets the mean traction of its adjacent
+/// nodes, and the remaining force is distributed over all of them (or those without adjacent nodes), as
+/// pressure rather than shear. Uniform tractions on each side are thus found exactly.
 class SideTractions {
  public:
-  /// `areas` [F x width]: what each facet gives to the area of its nodes [m^2]; facets of area 0 have no
-  /// part in it. `sides` must live as long.
+  /// `areas` [F x width]: contribution of each facet to the area of its nodes [m^2]; facets of area 0 do not
+  /// take part. `sides` must outlive this.
   SideTractions(const SurfaceSides& sides, std::span<const double> areas);
 
-  /// Traction at a place [N/m^2] by the forces on all nodes [N]; zero where the place has no area.
+  /// Traction at a place [N/m^2] by the forces on all nodes [N]; zero if the place has no area.
   [[nodiscard]] Vec3 at(Index place, std::span<const Vec3> force) const noexcept;
 
-  /// Calls `visit(node, matrix)` for each node whose force has a part in the traction at a place:
-  /// traction = sum of matrix * force.
+  /// Calls `visit(node, matrix)` for each node whose force affects the traction at a place: traction = sum of
+  /// matrix * force.
   template <class Visit>
   void for_each(Index place, const Visit& visit) const {
     const auto at = static_cast<std::size_t>(place);
@@ -74,8 +73,8 @@ class SideTractions {
 
   const SurfaceSides* sides_;
   std::vector<double> area_;    // [places]
-  std::vector<Index> first_;    // [places + 1] in `by_`; only nodes where sides meet have any
-  std::vector<Index> by_;       // whose force
+  std::vector<Index> first_;    // [places + 1] in `by_`; empty except where sides meet
+  std::vector<Index> by_;       // nodes of these forces
   std::vector<Mat3> by_force_;  // [1/m^2]
 };
 

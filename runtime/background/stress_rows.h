@@ -1,4 +1,4 @@
-// Stress at nodes, as a linear function of displacement.
+// Nodal stress as a linear function of displacement.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,61 +13,63 @@ namespace palpate {
 
 /// [xx yy zz xy yz zx] [Pa], in the plane too.
 using Stress = Eigen::Matrix<double, 6, 1>;
-/// Stress by the three components of a vector.
+/// Stress per component of a vector.
 using StressBlock = Eigen::Matrix<double, 6, 3>;
 
 Stress stress_of(const Mat3& tensor) noexcept;
 double von_mises(const Stress& stress) noexcept;
 
-/// Hooke's law of a material, with what it says of the stress across a plane body.
+/// Hooke's law of a material, with the out-of-plane stress of a plane body.
 struct HookesLaw {
   HookesLaw(const Material& material, Analysis analysis);
 
-  double lambda;  ///< Lamé's first coefficient [Pa]; in plane stress that of the sheet
+  double lambda;  ///< Lamé's first coefficient [Pa]; in plane stress the effective one
   double mu;      ///< shear modulus [Pa]
-  Mat3 initial;   ///< D eps_0 [Pa], in the plane its xx, yy and xy
+  Mat3 initial;   ///< D eps_0 [Pa], in the plane xx, yy and xy
   bool is_plane;
-  double across_by_sum = 0.0;   ///< in the plane: sigma_zz by sigma_xx + sigma_yy [-] ...
-  double across_initial = 0.0;  ///< ... and the rest of it [Pa]
+  double across_by_sum = 0.0;   ///< in the plane: sigma_zz = this (sigma_xx + sigma_yy) + ... [-]
+  double across_initial = 0.0;  ///< in the plane: ... + this [Pa]
 
-  /// In the plane: zz from xx and yy, of a stress that has a part by displacement or traction only.
+  /// Computes zz from xx and yy in the plane, for the part of a stress due to displacement or traction.
   void complete(StressBlock& block) const noexcept;
   /// Completes the constant part of the stress.
   void complete(Stress& stress) const noexcept;
 };
 
-/// Stress by the displacement of a node whose shape function has the gradient g [1/m]. `projector` P keeps
-/// the directions in which strain is known: lambda tr(e) P + 2 mu e with e = P sym(u g^T) P, where P g = g.
+/// Stress due to the displacement of a node whose shape function has the gradient g [1/m]. The projector P
+/// selects the directions in which strain is known: lambda tr(e) P + 2 mu e with e = P sym(u g^T) P, where P
+/// g = g.
 StressBlock stress_by_displacement(const HookesLaw& law, double lambda, const Mat3& projector,
                                    const Vec3& g) noexcept;
 
-/// Each row: a node's stress by the displacement of some nodes.
+/// Rows, each the stress of a node as a function of the displacement of some nodes.
 struct StressRows {
-  std::vector<Index> first;      ///< [rows + 1] of each row in `node` and `block`
-  std::vector<Index> node;       ///< whose displacement
-  std::vector<double> block;     ///< [6 x 3] each, column by column [Pa/m]
-  std::vector<Stress> constant;  ///< [rows]; not a number where the stress is not known
+  std::vector<Index> first;      ///< [rows + 1] begin of each row in `node` and `block`
+  std::vector<Index> node;       ///< node whose displacement each block applies to
+  std::vector<double> block;     ///< [6 x 3] each, column-major [Pa/m]
+  std::vector<Stress> constant;  ///< [rows]; NaN where the stress is unknown
 
-  /// Stress of all rows by the displacement of all nodes [m].
+  /// Computes the stress of all rows from the displacement of all nodes [m].
   void apply(std::span<const Vec3> u, std::span<Stress> stress) const noexcept;
 
-  /// Stress where parts of the body have turned, of each row in its own frame: what turns the nodes of a row
-  /// as one about its own is taken off their displacement first. For rows whose number is that of their node,
-  /// and that a shift of all nodes does not change. `at` [nodes]: where they are in the mesh [m]. Fills
-  /// `turn` [rows] with the rotations.
+  /// Computes the stress of each row in its own rotated frame, for bodies whose parts have rotated: the
+  /// common rotation of a row's nodes about its own node is first removed from their displacement. For rows
+  /// with the number of their node, and invariant under a translation of all nodes. `at` [nodes]: positions
+  /// in the mesh [m]. Writes the rotations to `turn` [rows].
   void apply_turned(std::span<const Vec3> at, bool is_plane, std::span<const Vec3> u, std::span<Mat3> turn,
                     std::span<Stress> stress) const noexcept;
 };
 
-/// Collects the weighted mean of what elements say of the stress at their nodes.
+/// Weighted mean of the elements' stresses at their nodes.
 class StressMean {
  public:
   explicit StressMean(std::size_t rows) : rows_(rows) {}
 
-  /// What one element says at a node: by displacement of its nodes, and constant.
+  /// Adds the stress of one element at a node: the part due to its nodes' displacement, and the constant
+  /// part.
   void add(Index row, double weight, std::span<const Index> nodes, std::span<const StressBlock> by_nodes,
            const Stress& constant);
-  /// Not a number where nothing was added.
+  /// Returns the mean; NaN where nothing was added.
   [[nodiscard]] StressRows rows() const;
 
  private:

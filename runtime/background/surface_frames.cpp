@@ -14,7 +14,7 @@ namespace {
 
 constexpr auto frame_pause = std::chrono::milliseconds(1);
 
-/// A body in the plane, all of whose nodes that can move are stored.
+/// True for a body in the plane all of whose movable nodes are stored.
 bool knows_interior(const Body& body) {
   if (body.dimension() != 2) return false;
   const std::vector<std::uint8_t>& fixed = body.model().fixed;
@@ -28,7 +28,7 @@ void append(const Vec3& vector, std::vector<float>& numbers) {
   for (const double x : vector) numbers.push_back(static_cast<float>(x));
 }
 
-/// Held where all nodes of the body are that it follows.
+/// A refined node is held along the axes along which all nodes of the body that it follows are held.
 std::uint8_t held_axes(const Body& body, std::size_t node) {
   const FineSurface& fine = body.fine_surface();
   unsigned held = (1U << body.dimension()) - 1U;

@@ -1,4 +1,4 @@
-// The displacement of the whole surface, at display rate, beside the tick.
+// Displacement of the whole surface at display rate, computed beside the tick.
 #pragma once
 
 #include <array>
@@ -21,43 +21,43 @@ namespace palpate {
 
 struct SurfaceFramesOptions {
   std::int64_t ticks_per_frame = 16;
-  bool in_background = true;   ///< else `post` computes the frame itself: equal runs stay equal
-  bool contacts_only = false;  ///< nothing is computed: of a picture `loads` alone, with tick and time
+  bool in_background = true;   ///< false: `post` computes the frame itself, so that equal runs stay equal
+  bool contacts_only = false;  ///< nothing is computed: pictures have only `loads`, tick and time
 };
 
-/// What is seen at one moment.
+/// Picture of one moment.
 struct SurfacePicture {
   SurfaceFrame frame;
-  ContactLoads loads;  ///< SurfaceFramesOptions::contacts_only
-  ToolPose device;     ///< where the hand wants the tool
-  ToolPose tool;       ///< where it is
-  Wrench on_body;      ///< the opposite of what the hand feels
+  ContactLoads loads;  ///< with SurfaceFramesOptions::contacts_only
+  ToolPose device;     ///< pose requested by the hand
+  ToolPose tool;       ///< actual pose
+  Wrench on_body;      ///< wrench on the body, opposite to that on the hand
   StepStatus status = StepStatus::ok;
-  double force_error = 0.0;            ///< how far the force may be off, where it is a best effort [N]
-  Index left_out = 0;                  ///< contact points that found no room
+  double force_error = 0.0;            ///< possible error of the force if it is a best effort [N]
+  Index left_out = 0;                  ///< contact points beyond the capacity
   double greens_error = 0.0;           ///< ToolState::greens_error [N]
-  std::vector<SeenContact> contacts;   ///< those that are closed
-  std::shared_ptr<const Patch> patch;  ///< null: no overlay
-  /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
+  std::vector<SeenContact> contacts;   ///< closed contacts
+  std::shared_ptr<const Patch> patch;  ///< null if there is no overlay
+  /// In the plane with all free nodes stored: values of all mesh nodes, without an overlay's refinement; else
   /// empty.
-  std::vector<float> plane_displacement;  ///< [N x 3] node + displacement is what is seen [m]
+  std::vector<float> plane_displacement;  ///< [N x 3] displacement relative to the mesh [m]
   std::vector<float> plane_von_mises;     ///< [N] [Pa]
 };
 
-/// Takes a frame each `ticks_per_frame` ticks, from the first one on, and hands it to `sink`. In the
-/// background a thread of its own computes it; where that takes too long, frames are left out.
+/// Takes a frame every `ticks_per_frame` ticks, from the first one on, and passes it to `sink`. In the
+/// background a thread of its own computes it; if that is too slow, frames are dropped.
 class SurfaceFrames {
  public:
   using Sink = std::function<void(SurfacePicture)>;
 
-  /// `body` must live as long; `state` is one that the loop will use, or a copy. `sink` is called by one
-  /// thread and does not throw.
+  /// `body` must outlive this; `state` is the loop's state or a copy. `sink` is called by one thread and must
+  /// not throw.
   SurfaceFrames(const Body& body, const State& state, const SurfaceFramesOptions& options, Sink sink);
-  ~SurfaceFrames();  ///< after the last frame that was posted
+  ~SurfaceFrames();  ///< waits for the last posted frame
   SurfaceFrames(const SurfaceFrames&) = delete;
   SurfaceFrames& operator=(const SurfaceFrames&) = delete;
 
-  /// After each tick, with its number and time [s]. In the background it is real-time safe.
+  /// Call after each tick, with its number and time [s]. Real-time safe in the background.
   void post(const State& state, std::int64_t tick, double time) noexcept;
 
  private:
@@ -80,12 +80,12 @@ class SurfaceFrames {
     Index left_out = 0;
     double greens_error = 0.0;
   };
-  /// The interior of a body in the plane.
+  /// Interior of a body in the plane.
   struct Interior {
     StressRows rows;
     std::vector<Vec3> u;         // [N] u0 + u
     std::vector<Stress> stress;  // [N]
-    std::vector<Mat3> turn;      // [N] of the nodes' frames, where parts of the body turn
+    std::vector<Mat3> turn;      // [N] rotations of the nodes' frames, if parts of the body rotate
   };
 
   void take_contacts(const State& state, Moment& moment) const noexcept;
@@ -97,14 +97,14 @@ class SurfaceFrames {
   SurfaceFramesOptions options_;
   Sink sink_;
   Latest<Moment> moments_;
-  std::optional<PictureMaker> maker_;  // none of contacts alone
-  std::optional<Interior> interior_;   // in the plane, where all of it is known
+  std::optional<PictureMaker> maker_;  // empty for contacts alone
+  std::optional<Interior> interior_;   // in the plane, if all of it is known
   std::int64_t computed_ = -1;         // tick of the last frame
   std::atomic<bool> stop_ = false;
   std::thread worker_;
 };
 
-/// The surface of a body as a recording keeps it.
+/// Returns the surface of a body in the form of a recording.
 RecordedSurface recorded_surface(const Body& body);
 
 }  // namespace palpate

@@ -36,7 +36,7 @@ Tangent tangent_at(ElementType type, const ElementNodes& x, const Vec3& xi) noex
   return {Vec3(J.col(0)).cross(Vec3(J.col(1))).normalized(), reference * metric.inverse() * J.transpose()};
 }
 
-/// What a material says at a point of a facet.
+/// Coefficients of a material's law at a point of a facet.
 struct FacetLaw {
   FacetLaw(const HookesLaw& of, const Vec3& normal) noexcept
       : law(of),
@@ -70,10 +70,9 @@ struct FacetLaw {
   double ratio;
 };
 
-/// Integrals of the shape functions of a tri6 are zero at its corners, and so
-/// are its corners' forces under an even pressure. Middles give a part to the
-/// ends of their edges, so that an even pressure has even quotients: those of
-/// the linear simplices that a tri6 is cut into.
+/// Integrals of the shape functions of a tri6 are zero at its corners, and so are the corner forces under a
+/// uniform pressure. Mid-side nodes pass a part to the ends of their edges, so that a uniform pressure has
+/// uniform quotients: those of the linear simplices into which a tri6 is divided.
 template <class T, class At>
 void spread_middles(std::span<const Index> nodes, std::vector<std::uint8_t>& done, const At& at) {
   for (std::size_t k = 3; k < nodes.size(); ++k) {
@@ -154,7 +153,7 @@ Vec3 SurfaceStress::normal_of(const Facet& facet) const noexcept {
   return tangent_at(facet.type, positions_of(facet.nodes), middle).normal;
 }
 
-/// [simplices x d] what each gives to the area of its nodes.
+/// Returns the contributions [simplices x d] to the area of the nodes.
 std::vector<double> SurfaceStress::simplex_areas(std::span<const Index> simplices) const {
   const auto d = static_cast<std::size_t>(body_.dimension());
   const ElementType type = d == 3 ? ElementType::tri3 : ElementType::line2;
@@ -177,7 +176,7 @@ void SurfaceStress::measure() {
   sides_.emplace(body_nodes(), facet_nodes_, normals);
 }
 
-/// What the loads pull at the surface's nodes with [N].
+/// Returns the forces of the loads on the surface nodes [N].
 std::vector<Vec3> SurfaceStress::nodal_forces_of_loads() const {
   const Model& model = body_.model();
   const int d = model.dimension();
@@ -235,8 +234,7 @@ void SurfaceStress::find_traction_of_loads() {
     load_traction_.push_back(tractions.at(static_cast<Index>(place), force));
 }
 
-/// The sides of the refined surface, and the loads' tractions there as the
-/// facets' shape functions say.
+/// Computes the sides of the refined surface, and the loads' tractions there by the facets' shape functions.
 void SurfaceStress::refine_sides() {
   const auto d = static_cast<std::size_t>(body_.dimension());
   const std::span<const Index> simplices = body_.simplices();
@@ -251,7 +249,7 @@ void SurfaceStress::refine_sides() {
   for (std::size_t k = 0; k < simplices.size(); ++k) {
     const auto node = static_cast<std::size_t>(simplices[k]);
     Vec3& traction = fine_load_traction_[fine_sides_->places_of_facets()[k]];
-    traction.setZero();  // each simplex of a side says the same
+    traction.setZero();  // all simplices of a side give the same
     const std::size_t of_facet = width * (k / (d * simplices_of_facet_));
     const auto nodes = std::span(facet_nodes_).subspan(of_facet, width);
     for (auto j = static_cast<std::size_t>(fine.first[node]);
@@ -266,15 +264,14 @@ void SurfaceStress::refine_sides() {
 }
 
 void SurfaceStress::make_rows() {
-  // Contact forces are on the nodes of the simplices that the facets are cut
-  // into.
+  // Contact forces act on the nodes of the simplices into which the facets are divided.
   const auto d = static_cast<std::size_t>(body_.dimension());
   const std::size_t width = sides_->width();
   const std::vector<Index> simplices =
       surface_simplices({.facet = facet_type_, .facets = facet_nodes_, .nodes = {}});
   const std::vector<double> of_simplices = simplex_areas(simplices);
   std::vector<double> areas(facet_nodes_.size());
-  const std::size_t cut = simplices.size() / d / facets();  // simplices of a facet
+  const std::size_t cut = simplices.size() / d / facets();  // simplices per facet
   for (std::size_t k = 0; k < simplices.size(); ++k) {
     const std::size_t first = width * (k / (d * cut));
     const auto nodes = std::span(facet_nodes_).subspan(first, width);
@@ -284,7 +281,7 @@ void SurfaceStress::make_rows() {
   const SideTractions tractions(*sides_, areas);
 
   StressMean mean(body_nodes());
-  std::vector<std::map<Index, StressBlock>> by_force(body_nodes());  // of each node: stress of which by it
+  std::vector<std::map<Index, StressBlock>> by_force(body_nodes());  // stress of nodes by each node's force
   std::vector<double> weight(body_nodes());
   std::vector<StressBlock> blocks;
   for (std::size_t f = 0; f < facets(); ++f) {
@@ -381,12 +378,12 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
   for (const Index node : patch.surface_nodes()) {
     const auto at = static_cast<std::size_t>(node);
     on_patch_[at] = 0;
-    stress[at] /= weight_[at];  // 0 / 0 where no facet counts
+    stress[at] /= weight_[at];  // 0 / 0 if no facet counts
   }
   for (const Index element : patch.elements()) in_patch_[element] = 0;
 }
 
-/// Place among the values of the patch of a node of a facet on the refined surface.
+/// Index, among the patch's values, of a node of a facet on the refined surface.
 std::size_t SurfaceStress::place_on_patch(std::size_t facet, Index node) const noexcept {
   if (!fine_sides_->is_creased(node)) return static_cast<std::size_t>(node);
   const std::size_t count = fine_sides_->width() * simplices_of_facet_;
@@ -396,7 +393,7 @@ std::size_t SurfaceStress::place_on_patch(std::size_t facet, Index node) const n
       fine_sides_->places_of_facets()[count * facet + static_cast<std::size_t>(found - nodes.begin())]);
 }
 
-/// Adds what a facet says at those of its nodes that are on the patch.
+/// Adds the stress of a facet at its nodes on the patch.
 template <class PlaceOf>
 void SurfaceStress::add(const Facet& facet, const PlaceOf& place_of, std::span<const Vec3> u,
                         std::span<const Vec3> contact_force, std::span<Stress> sum) noexcept {

@@ -12,12 +12,12 @@ namespace palpate {
 namespace {
 
 constexpr WarpBalanceOptions effort{.tolerance = 1e-4, .most_rounds = 3};
-constexpr double most_behind = 0.03;  // [rad] by which W is behind
-constexpr double most_wrong = 0.3;    // share of how far a step moved loaded nodes by which W was off
-constexpr double least_wrong = 1e-6;  // share of their displacement: less does not matter
-constexpr double least_part = 1e-6;   // of the largest: smaller parts of a compliance are rounding
+constexpr double most_behind = 0.03;  // [rad] by which W may lag
+constexpr double most_wrong = 0.3;    // error of W, as a fraction of a step's displacement of loaded nodes
+constexpr double least_wrong = 1e-6;  // fraction of their displacement below which it is negligible
+constexpr double least_part = 1e-6;   // of the largest: smaller eigenvalues of a compliance are rounding
 
-/// The inverse of a symmetric matrix without negative eigenvalues, where it is not zero but for rounding.
+/// Pseudo-inverse of a positive semidefinite matrix; eigenvalues within rounding of zero are dropped.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& A) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(0.5 * (A + A.transpose()));
   const double least = least_part * parts.eigenvalues().maxCoeff();
@@ -66,7 +66,7 @@ void WarpedMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexc
     warp_.rotations(balance_.place(), R_);
     if (must_turn(job)) turn_compliance(job);
     tell(is_balanced);
-  } catch (const std::exception&) {  // there is no memory: the body stays as it was
+  } catch (const std::exception&) {  // out of memory: the body stays as it was
   }
   std::fill(by_load_.begin(), by_load_.end(), 0.0);
   if (!job.load.empty()) now().displacement(job.load.nodes(), job.load.forces(), by_load_);
@@ -80,7 +80,7 @@ bool WarpedMotion::must_turn(const MotionJob& job) const {
     behind = std::max(behind, half_sine(R_[node], R_turned_[node]));
   if (behind > 0.5 * most_behind) return true;
   if (turned_ == nullptr || job.load.empty()) return false;
-  // Where the tick had the loaded nodes, against where they are.
+  // Positions of the loaded nodes in the tick, compared with the actual ones.
   std::vector<double> by_load(x_.size());
   turned_->displacement(job.load.nodes(), job.load.forces(), by_load);
   double off = 0.0, moved = 0.0, size = 0.0;
@@ -94,7 +94,7 @@ bool WarpedMotion::must_turn(const MotionJob& job) const {
   return off > most_wrong * most_wrong * moved && off > least_wrong * least_wrong * size;
 }
 
-/// A unit force along an axis [n], spread as the load is.
+/// Unit force along an axis [n], distributed as the load is.
 std::vector<double> WarpedMotion::spread(const MotionJob& job, int axis) const {
   const auto d = static_cast<std::size_t>(body_.dimension());
   std::vector<double> p(x_.size(), 0.0);
@@ -112,7 +112,7 @@ void WarpedMotion::turn_compliance(const MotionJob& job) {
   Greens turned = body_.greens().turned(R_);
   if (!job.load.empty()) {
     const int d = body_.dimension();
-    // Spread forces, how the body moves with them, and how turned blocks alone would have it.
+    // Distributed forces, the body's displacement by them, and that by rotated blocks alone.
     Eigen::MatrixXd P(std::ssize(x_), d), S(std::ssize(x_), d), T(std::ssize(x_), d);
     std::vector<Index> nodes(static_cast<std::size_t>(body_.greens().nodes()));
     std::iota(nodes.begin(), nodes.end(), 0);
