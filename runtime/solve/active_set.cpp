@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-constexpr double gap_tolerance = 1e-11;  // of the largest entry of b: rounding
+constexpr double gap_tolerance = 1e-11;  // rounding error, relative to the largest entry of b
 
 }  // namespace
 
@@ -22,7 +22,7 @@ ActiveSet::ActiveSet(Index max_rows)
       entries_(static_cast<std::size_t>(max_rows) + 1),
       lower_(packed_size(max_rows)) {}
 
-/// Takes the first `count` of active_ into the factor together; false where they depend on each other.
+/// Adds the first `count` rows of active_ to the factor together; false if they are linearly dependent.
 bool ActiveSet::activate_all(const ContactProblem& problem, Index count) noexcept {
   double* to = lower_.data();
   for (Index j = 0; j < count; ++j) {
@@ -51,14 +51,14 @@ void ActiveSet::deactivate(Index position) noexcept {
   factor_.remove(position);
 }
 
-/// z = -C^-1 b on the active rows.
+/// Computes z = -C^-1 b on the active rows.
 void ActiveSet::solve_active(std::span<const double> b) noexcept {
   const auto count = static_cast<std::size_t>(factor_.nodes());
   for (std::size_t k = 0; k < count; ++k) z_[k] = -b[active_[k]];
   factor_.solve({z_.data(), count});
 }
 
-/// Goes from lambda towards z until the first normal force is zero, and takes that row out. True when z was
+/// Moves lambda towards z until the first normal force becomes zero, and removes that row. True if z was
 /// reached.
 bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
   double step = 1.0;
@@ -83,7 +83,7 @@ bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
   return false;
 }
 
-/// The inactive row with the most negative gap beyond rounding, -1 when there is none.
+/// Inactive row with the most negative gap beyond rounding; -1 if there is none.
 Index ActiveSet::most_violated(const ContactProblem& problem) const noexcept {
   double largest = 0.0;
   for (Index i = 0; i < problem.rows; ++i) largest = std::max(largest, std::abs(problem.b[i]));
@@ -100,7 +100,7 @@ Index ActiveSet::most_violated(const ContactProblem& problem) const noexcept {
   return found;
 }
 
-/// The rows that carry force in the guess are active, but for those that depend on others.
+/// Activates the rows that carry force in the guess, except linearly dependent ones.
 void ActiveSet::begin(ContactProblem& problem) noexcept {
   std::fill_n(state_.begin(), problem.rows, Row::inactive);
   for (Index k = 0; k < problem.contacts; ++k) {
@@ -116,7 +116,7 @@ void ActiveSet::begin(ContactProblem& problem) noexcept {
     for (Index k = 0; k < count; ++k) state_[active_[k]] = Row::active;
     return;
   }
-  for (Index k = 0; k < count; ++k) {  // active_ is written over no farther than it is read
+  for (Index k = 0; k < count; ++k) {  // in place: active_ is never written ahead of where it is read
     const Index row = active_[k];
     if (!activate(problem, row)) problem.lambda[row] = 0.0;
   }
@@ -130,7 +130,7 @@ bool ActiveSet::solve(ContactProblem& problem) noexcept {
   while (rounds_ < most_rounds) {
     ++rounds_;
     solve_active(problem.b);
-    if (entered >= 0 && z_[factor_.nodes() - 1] <= 0.0) {  // rounding alone let it in
+    if (entered >= 0 && z_[factor_.nodes() - 1] <= 0.0) {  // entered because of rounding alone
       deactivate(factor_.nodes() - 1);
       state_[entered] = Row::dependent;
       entered = -1;

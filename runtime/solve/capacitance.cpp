@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// Calls f with the dofs a node, a constant for the compiler.
+/// Calls f with the dofs per node as a compile-time constant.
 template <class F>
 auto with_dimension(int dimension, const F& f) noexcept {
   switch (dimension) {
@@ -38,7 +38,7 @@ void subtract_columns(const std::array<const double*, D>& L, const std::array<do
   }
 }
 
-constexpr std::int64_t panel = 4;  // columns that are taken out of the later ones together
+constexpr std::int64_t panel = 4;  // columns eliminated from the later ones together
 
 /// y -= L x and z -= L w for the part of L below two diagonal entries: L is read once.
 void subtract_columns(const std::array<const double*, panel>& L, const std::array<double, panel>& x,
@@ -56,7 +56,7 @@ void subtract_columns(const std::array<const double*, panel>& L, const std::arra
   }
 }
 
-/// Givens rotation of the column pair (L, w) that keeps L L^T + w w^T and zeroes w at the top.
+/// Givens rotation of the column pair (L, w) that preserves L L^T + w w^T and zeroes the first entry of w.
 void rotate_in(double* __restrict L, double* __restrict w, std::int64_t count) noexcept {
   const double r = std::sqrt(L[0] * L[0] + w[0] * w[0]);
   const double c = L[0] / r;
@@ -92,8 +92,8 @@ const double* CapacitanceMatrix::column(std::int64_t j) const noexcept {
   return L_.data() + packed_column(j, capacity_);
 }
 
-/// One node of the forward substitution L y = b: solves for the D entries of y from j on and takes them out
-/// of the later ones, of `rows` in all.
+/// One node of the forward substitution L y = b: solves for the D entries of y from j on and eliminates them
+/// from the later ones, of `rows` in all.
 template <int D>
 void CapacitanceMatrix::eliminate(std::int64_t j, double* y, std::int64_t rows) const noexcept {
   y += j;
@@ -150,8 +150,8 @@ void CapacitanceMatrix::remove_node(Index k) noexcept {
   const std::int64_t gone = D * std::int64_t{k};
   const std::int64_t rest = m - gone - D;
 
-  // What the dropped columns carried of the later rows, W, must go into these rows' own factor: L' L'^T = L
-  // L^T + W W^T.
+  // The contribution W of the dropped columns to the later rows must be added to the factor of these rows: L'
+  // L'^T = L L^T + W W^T.
   double* W[D];
   for (std::int64_t p = 0; p < D; ++p) {
     W[p] = rows_.data() + p * capacity_;
@@ -175,8 +175,8 @@ CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcep
   return with_dimension(dimension_, [&](auto d) { return add_node<d>(blocks); });
 }
 
-/// Cholesky of columns [first, end), from which the former ones are taken out already; false where a pivot is
-/// no more than rounding of the diagonal of C, which is in rows_.
+/// Cholesky factorisation of columns [first, end), from which the previous ones are eliminated already; false
+/// if a pivot is within rounding of zero relative to the diagonal of C, which is in rows_.
 bool CapacitanceMatrix::factor_panel(std::int64_t first, std::int64_t end, std::int64_t rows) noexcept {
   for (std::int64_t j = first; j < end; ++j) {
     double* to = column(j);
@@ -191,7 +191,7 @@ bool CapacitanceMatrix::factor_panel(std::int64_t first, std::int64_t end, std::
   return true;
 }
 
-/// Takes the panel from column `first` on out of all later columns, two at a time.
+/// Eliminates the panel that starts at column `first` from all later columns, two at a time.
 void CapacitanceMatrix::subtract_panel(std::int64_t first, std::int64_t rows) noexcept {
   std::array<const double*, panel> L;
   std::array<double, panel> x, w;
@@ -247,7 +247,7 @@ void CapacitanceMatrix::solve(std::span<double> x) const noexcept {
   }
 }
 
-/// By the scalar columns of L: the chain of divisions is as long for S right-hand sides as for one.
+/// Works on the scalar columns of L: the chain of divisions is as long for S right-hand sides as for one.
 template <int S>
 void CapacitanceMatrix::solve_systems(double* x) const noexcept {
   const std::int64_t m = std::int64_t{dimension_} * nodes_;

@@ -17,12 +17,12 @@ double largest_force(const ContactProblem& problem) noexcept {
   return largest;
 }
 
-/// The one or two tangential forces of a contact.
+/// Tangential force of a contact, with one or two components.
 struct Tangential {
   double x = 0.0;
   double y = 0.0;
   [[nodiscard]] double norm() const noexcept { return std::sqrt(x * x + y * y); }
-  /// The nearest point within a disc.
+  /// Nearest point in a disc of this radius.
   [[nodiscard]] Tangential within(double radius) const noexcept {
     const double length = norm();
     if (length <= radius) return *this;
@@ -58,14 +58,14 @@ ConeSolver::ConeSolver(Index max_contacts, Index max_rows)
   newton_.resize(rows);
 }
 
-/// r = b + W lambda.
+/// Computes r = b + W lambda.
 void ConeSolver::find_motion(const ContactProblem& problem) noexcept {
   for (Index i = 0; i < problem.rows; ++i) {
     motion_[i] = problem.b[i] + dot(problem.row(i), problem.lambda.data(), problem.rows);
   }
 }
 
-/// One force changes, and the motion with it.
+/// Changes one force, and the motion with it.
 void ConeSolver::change(ContactProblem& problem, Index row, double by) noexcept {
   if (by == 0.0) return;
   problem.lambda[row] += by;
@@ -103,7 +103,7 @@ double ConeSolver::residual(const ContactProblem& problem) const noexcept {
   return worst;
 }
 
-/// Each contact in turn takes the forces that suit it, the others being as they are.
+/// Solves each contact in turn, with the forces of the others fixed.
 void ConeSolver::sweep(ContactProblem& problem) noexcept {
   for (Index k = 0; k < problem.contacts; ++k) {
     const Index first = problem.first_row(k);
@@ -153,8 +153,8 @@ void ConeSolver::choose_modes(const ContactProblem& problem) noexcept {
   }
 }
 
-/// Derivative of the equations: rows of W, but where a contact slips
-///   dlambda_t - mu dlambda_n e - s (I - e e^T) (dlambda_t - dr_t / w_t), with s the share and e the
+/// Sets up the Jacobian of the equations: rows of W, except for a slipping contact
+///   dlambda_t - mu dlambda_n e - s (I - e e^T) (dlambda_t - dr_t / w_t), with s from share_ and e the
 ///   direction.
 void ConeSolver::linearise(const ContactProblem& problem) noexcept {
   const auto gather_row = [&](Index row, double factor, double* out) {
@@ -177,7 +177,7 @@ void ConeSolver::linearise(const ContactProblem& problem) noexcept {
         gather_row(row, 1.0, out);
         continue;
       }
-      // In metres like the other rows: the equation of forces over the weight.
+      // In metres like the other rows: the equation of forces divided by the weight.
       const double compliance = 1.0 / weight_[row];
       const double e = direction_[row];
       out[base] -= compliance * problem.friction[contact] * e;
@@ -192,7 +192,7 @@ void ConeSolver::linearise(const ContactProblem& problem) noexcept {
   }
 }
 
-/// P J = L U, row pivoting.
+/// Factorises P J = L U with row pivoting.
 bool ConeSolver::factor_jacobian() noexcept {
   for (Index k = 0; k < unknowns_; ++k) {
     Index best = k;
@@ -214,7 +214,7 @@ bool ConeSolver::factor_jacobian() noexcept {
   return true;
 }
 
-/// x = J^-1 x.
+/// Solves x = J^-1 x in place.
 void ConeSolver::solve_jacobian() noexcept {
   for (Index k = 0; k < unknowns_; ++k) std::swap(x_[k], x_[pivot_[k]]);
   for (Index i = 0; i < unknowns_; ++i) x_[i] -= dot(jacobian_row(i), x_.data(), i);
@@ -225,7 +225,7 @@ void ConeSolver::solve_jacobian() noexcept {
   }
 }
 
-/// One Newton step about lambda; false, with nothing changed, when J is singular.
+/// Performs one Newton step from lambda; false, with nothing changed, if J is singular.
 bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
   choose_modes(problem);
   for (Index k = 0; k < problem.contacts; ++k) {
@@ -257,8 +257,8 @@ bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
   return true;
 }
 
-/// The longest of some shares of the Newton step from `from` that takes the residual down enough; false, with
-/// nothing changed, when none does.
+/// Takes the longest of several fractions of the Newton step from `from` that reduces the residual enough;
+/// false, with nothing changed, if none does.
 bool ConeSolver::search_along_step(ContactProblem& problem, double& now) noexcept {
   std::copy_n(problem.lambda.begin(), problem.rows, newton_.begin());
   for (const double share : tuning.cone.step_shares) {
@@ -280,8 +280,8 @@ void ConeSolver::start_from(ContactProblem& problem, const std::vector<double>& 
   find_motion(problem);
 }
 
-/// Newton's method, at most `rounds` of it, from lambda. True when the residual is small enough; else lambda
-/// is the best that was met.
+/// Newton's method from lambda, at most `rounds` rounds. True if the residual is small enough; otherwise
+/// lambda is the best found.
 bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
   scale_rows(problem);
   find_motion(problem);
@@ -298,8 +298,8 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
     work_ += std::pow(unknowns_, 3) / 3.0 + 2.0 * std::pow(problem.rows, 2);
     if (stepped && is_good_enough(problem, tuning.cone.tolerance)) return true;
     if (stepped && search_along_step(problem, now)) continue;
-    // Newton may run in circles between sets of closed contacts: tuning.cone.sweeps from where it would go,
-    // at times from here.
+    // Newton may cycle between sets of closed contacts: do tuning.cone.sweeps from the end of its step,
+    // sometimes from its start.
     const bool returns = (round + 1) % tuning.cone.return_stride == 0;
     start_from(problem, stepped && !returns ? newton_ : from_);
     for (int k = 0; k < tuning.cone.sweeps; ++k) sweep(problem);
@@ -310,7 +310,7 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
   return false;
 }
 
-/// Adds the springs that draw lambda to where it is, `share` of w_ii each, or takes them away.
+/// Adds a proximal term that pulls lambda towards its present value, with the weight `share` w_ii.
 void ConeSolver::add_springs(ContactProblem& problem, double share) noexcept {
   for (Index i = 0; i < problem.rows; ++i) {
     const auto row = static_cast<std::size_t>(i);
@@ -332,7 +332,7 @@ bool ConeSolver::is_good_enough(const ContactProblem& problem, double share) con
   return residual(problem) <= share * largest_force(problem);
 }
 
-/// From lambda.
+/// Solves the part, starting from lambda.
 bool ConeSolver::solve_part(ContactProblem& problem) noexcept {
   std::copy_n(problem.lambda.begin(), problem.rows, guess_.begin());
   if (iterate(problem, tuning.cone.plain_rounds)) return true;
@@ -352,7 +352,7 @@ bool ConeSolver::solve_part(ContactProblem& problem) noexcept {
 bool ConeSolver::solve(ContactProblem& problem) noexcept {
   rounds_ = 0;
   work_ = 0.0;
-  if (!part_.choose_closed(problem)) {  // the solution without friction is the guess
+  if (!part_.choose_closed(problem)) {  // the frictionless solution is the guess
     part_.choose_all(problem);
     part_.gather(problem, false);
     without_friction_.solve(part_.problem);

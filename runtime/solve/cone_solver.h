@@ -1,4 +1,4 @@
-// Contact with Coulomb friction.
+// Solver for contact with Coulomb friction.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,37 @@ namespace palpate {
 
 /// Solves a ContactProblem with friction: a semismooth Newton method on Alart & Curnier's equations (1991)
 ///   lambda_n = max(0, lambda_n - r_n / w_n),
-///   lambda_t = the point nearest to lambda_t - r_t / w_t within the disc of radius mu lambda_n,
-/// guarded by block Gauss-Seidel sweeps, and where that runs in circles by proximal steps: springs draw the
-/// forces to where they are, and are made weaker from step to step (Rockafellar 1976). Residual: the largest
-/// difference of the two sides. Solved are the contacts that the guess closes (without a guess: those that
-/// are closed without friction); those left out that are then penetrated are taken in. The budget is
-/// ConeTuning's `most_rounds` rounds, and beyond the fourth `most_work`, or what `take_time` says. All memory
-/// is taken at construction.
+///   lambda_t = projection of lambda_t - r_t / w_t onto the disc of radius mu lambda_n,
+/// safeguarded by block Gauss-Seidel sweeps and, if these cycle, by proximal steps: a term pulls the forces
+/// towards their present values, with a weight that decreases from step to step (Rockafellar 1976). Residual:
+/// the largest difference of the two sides. Only contacts closed in the guess are solved for (without a
+/// guess: those closed without friction); others that are penetrated afterwards are added. The budget is
+/// ConeTuning's `most_rounds` rounds, and beyond the fourth `most_work`, or that of `take_time`. All memory
+/// is allocated at construction.
 class ConeSolver {
  public:
   ConeSolver(Index max_contacts, Index max_rows);
 
-  /// From now on no tick waits: the budget is so many rounds, whatever they cost.
+  /// Sets a budget of rounds, whatever they cost, for solves without a waiting tick.
   void take_time(int most_rounds) noexcept {
     most_rounds_ = most_rounds;
     most_work_ = std::numeric_limits<double>::infinity();
   }
 
-  /// Fills problem.lambda from the guess in it, to `tolerance` where the budget suffices. False when the
-  /// residual is over `accepted`, or a contact left out is penetrated: lambda is then the best that was
-  /// found; forces are within the cones.
+  /// Computes problem.lambda from the guess in it, to `tolerance` if the budget suffices. False if the
+  /// residual exceeds `accepted`, or an excluded contact is penetrated: lambda is then the best found, with
+  /// forces inside the cones.
   bool solve(ContactProblem& problem) noexcept;
 
-  /// What lambda changes by when b changes by `db` [rows], to first order: [rows]. Contacts stay open,
-  /// sticking or slipping as they are.
+  /// Derivative of lambda [rows] for a change `db` [rows] of b. Contacts stay open, sticking or slipping as
+  /// they are.
   void derivative(const ContactProblem& problem, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
-  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< rounds of the last `solve`
   [[nodiscard]] bool was_easy() const noexcept {
     return work_ < tuning.cone.easy_share * tuning.cone.most_work;
-  }  ///< `solve` left time for another
+  }  ///< `solve` left time for another pass
 
  private:
   enum class Mode : std::uint8_t { open, stick, slip };
@@ -72,24 +72,24 @@ class ConeSolver {
     return J_.data() + static_cast<std::ptrdiff_t>(i) * stride_;
   }
 
-  ContactPart part_;  // that may be closed; all that follows is of it
+  ContactPart part_;  // contacts that may be closed; all the following belongs to this part
   ActiveSet without_friction_;
   std::ptrdiff_t stride_;
   std::vector<double> motion_;     // [rows] r
   std::vector<double> weight_;     // [rows] 1 / w_n at normal rows, 1 / w_t at tangential ones [N/m]
   std::vector<Mode> mode_;         // [contacts]
-  std::vector<double> direction_;  // [rows] of lambda_t where a contact slips
-  std::vector<double> share_;      // [contacts] mu lambda_n / |lambda_t - r_t / w_t| there
+  std::vector<double> direction_;  // [rows] direction of lambda_t for a slipping contact
+  std::vector<double> share_;      // [contacts] mu lambda_n / |lambda_t - r_t / w_t| for a slipping contact
   std::vector<Index> unknown_;     // [unknowns] rows of the contacts that are not open
   Index unknowns_ = 0;
   std::vector<double> J_;         // [unknowns x stride] Jacobian, then its LU factor
   std::vector<Index> pivot_;      // [unknowns]
   std::vector<double> x_;         // [unknowns]
-  std::vector<double> best_;      // [rows] of the smallest residual
-  std::vector<double> from_;      // [rows] where a step begins
-  std::vector<double> newton_;    // [rows] where it ends
+  std::vector<double> best_;      // [rows] lambda of the smallest residual
+  std::vector<double> from_;      // [rows] start of a step
+  std::vector<double> newton_;    // [rows] end of a step
   std::vector<double> guess_;     // [rows]
-  std::vector<double> diagonal_;  // [rows] of W
+  std::vector<double> diagonal_;  // [rows] diagonal of W
   std::vector<double> b_;         // [rows]
   double work_ = 0.0, most_work_ = tuning.cone.most_work;
   int rounds_ = 0, most_rounds_ = tuning.cone.most_rounds;

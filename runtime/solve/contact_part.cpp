@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr double least_pivot = 1e-12;  // of the row's own compliance: less depends on the rows before
+constexpr double least_pivot = 1e-12;  // relative to the row's own compliance; smaller: linearly dependent
 
 bool is_held(const ContactProblem& whole, Index contact) noexcept {
   return whole.held[contact] != 0;
@@ -82,7 +82,7 @@ void ContactPart::gather(const ContactProblem& whole, bool with_friction) noexce
   eliminate_held(whole);
 }
 
-/// Row by row of L; the Schur complement at the end.
+/// Eliminates row by row of L; the Schur complement at the end.
 void ContactPart::eliminate_held(const ContactProblem& whole) noexcept {
   for (Index i = 0; i < held_rows_; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -109,7 +109,7 @@ void ContactPart::eliminate_held(const ContactProblem& whole) noexcept {
   }
 }
 
-/// lambda_h = -L^-T (y + X lambda_c).
+/// Computes lambda_h = -L^-T (y + X lambda_c).
 void ContactPart::solve_held(std::span<const double> change, std::span<double> lambda) noexcept {
   for (Index i = 0; i < held_rows_; ++i) y_[i] += dot(coupling_row(i), change.data(), problem.rows);
   for (Index i = held_rows_; i-- > 0;) {

@@ -1,4 +1,4 @@
-// The part of a contact problem that is solved by iteration.
+// Part of a contact problem that is solved iteratively.
 #pragma once
 
 #include <cstdint>
@@ -9,31 +9,32 @@
 
 namespace palpate {
 
-/// The contacts of a contact problem that may be closed, without its held rows: these are equations, and
-/// eliminated,
+/// Contacts of a problem that may be closed, without its held rows. Held rows are equations, and are
+/// eliminated:
 ///   W' = W_cc - W_ch W_hh^-1 W_hc,  b' = b_c - W_ch W_hh^-1 b_h  (Schur complement).
-/// A held row that has an owner is there when that is. All memory is taken at construction.
+/// A held row with an owner is present if its owner is. All memory is allocated at construction.
 class ContactPart {
  public:
   ContactPart(Index max_contacts, Index max_rows);
 
-  /// The contacts that the guess, whole.lambda, closes. False when there are none.
+  /// Chooses the contacts that are closed in the guess, whole.lambda. False if there are none.
   bool choose_closed(const ContactProblem& whole) noexcept;
   void choose_all(const ContactProblem& whole) noexcept;
-  /// Takes in the contacts that were left out and that whole.lambda lets penetrate by more than `force` [N]
-  /// would. False when there are none.
+  /// Adds the excluded contacts that penetrate for whole.lambda by more than `force` [N] would cause. False
+  /// if there are none.
   bool take_in_penetrated(const ContactProblem& whole, double force) noexcept;
 
-  /// Fills `problem` from the whole one, without friction if so wished.
+  /// Computes `problem` from the whole one, without friction if requested.
   void gather(const ContactProblem& whole, bool with_friction) noexcept;
-  /// Fills whole.lambda from problem.lambda; contacts that are left out have none.
+  /// Computes whole.lambda from problem.lambda; excluded contacts have no force.
   void spread(ContactProblem& whole) noexcept;
 
-  /// What b' changes by when b does: [problem.rows]. Then dlambda of the whole, where the part's is `change`.
+  /// Computes the change of b' [problem.rows] by a change of b; then the change of the whole lambda by
+  /// `change` of the part.
   void gather_change(std::span<const double> db, std::span<double> change) noexcept;
   void spread_change(std::span<const double> change, std::span<double> dlambda) noexcept;
 
-  ContactProblem problem;  ///< one row or d rows a contact, none held
+  ContactProblem problem;  ///< one row or d rows per contact, none held
 
  private:
   void eliminate_held(const ContactProblem& whole) noexcept;
@@ -42,12 +43,12 @@ class ContactPart {
   [[nodiscard]] double* coupling_row(Index i) noexcept { return X_.data() + std::ptrdiff_t{i} * stride_; }
 
   std::ptrdiff_t stride_;
-  std::vector<std::uint8_t> in_;  // [contacts of the whole]
+  std::vector<std::uint8_t> in_;  // [contacts of the whole] true for contacts in the part
   std::vector<Index> row_;        // [problem.rows] rows of the whole
   std::vector<Index> held_row_;   // [held rows] rows of the whole
   Index held_rows_ = 0;
   std::vector<double> L_;        // [held rows x stride] W_hh = L L^T
-  std::vector<double> inverse_;  // [held rows] 1 / l_ii, 0 for a row that depends on those before
+  std::vector<double> inverse_;  // [held rows] 1 / l_ii; 0 for a row that depends on earlier ones
   std::vector<double> X_;        // [held rows x stride] L^-1 W_hc
   std::vector<double> y_;        // [held rows] L^-1 b_h
 };

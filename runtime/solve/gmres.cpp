@@ -37,7 +37,7 @@ void Gmres::begin(std::ptrdiff_t rows, int steps, float tolerance) noexcept {
   for (std::ptrdiff_t i = 0; i < rows_; ++i) basis_[static_cast<std::size_t>(i)] /= size;
 }
 
-/// Turns column `column` of Hessenberg's matrix, whose last entry is `below`, into one of the triangular one.
+/// Reduces column `column` of the Hessenberg matrix, whose last entry is `below`, to triangular form.
 void Gmres::rotate(int column, float below) noexcept {
   for (int j = 0; j < column; ++j) {
     const float a = h(j, column);

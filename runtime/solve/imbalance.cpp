@@ -19,7 +19,7 @@ void set_contact(const ContactProblem& problem, Index contact, const Vec3& value
   for (Index i = 0; i < problem.rows_of(contact); ++i) of_rows[first + i] = value[i];
 }
 
-/// Mean of W's diagonal at a contact [m/N].
+/// Mean of the diagonal of W at a contact [m/N].
 double own_compliance(const ContactProblem& problem, Index contact) noexcept {
   double sum = 0.0;
   for (Index i = problem.first_row(contact); i < problem.first_row(contact + 1); ++i)
@@ -49,7 +49,8 @@ void add_motion(const ContactProblem& problem, const std::vector<double>& forces
   }
 }
 
-/// Alart and Curnier's projection: the normal part at least 0, the tangent within the disc that it allows.
+/// Alart and Curnier's projection: a normal part of at least 0, the tangential part inside the disc that it
+/// allows.
 Vec3 nearest_in_cone(const Vec3& n, const Vec3& force, const Vec3& tangent, double friction) noexcept {
   const double normal = std::max(0.0, n.dot(force));
   const double length = tangent.norm();
@@ -66,7 +67,7 @@ Imbalance::Imbalance(Index max_contacts, Index max_rows)
       mode_(static_cast<std::size_t>(max_contacts)),
       edge_(mode_.size(), Vec3::Zero()) {}
 
-/// r by the forces.
+/// Computes r for the forces.
 void Imbalance::find_motion(const ContactProblem& problem) noexcept {
   for (Index i = 0; i < problem.rows; ++i) {
     motion_[i] = problem.b[i];
@@ -106,8 +107,8 @@ void Imbalance::choose_mode(const ContactProblem& problem, Index contact) noexce
   set_contact(problem, contact, to - f, change_);
 }
 
-/// Leaves of the motion what the contact's equations forbid: all of it where it sticks, what is along the
-/// normal where it slips, which is undone along the cone's edge.
+/// Reduces the motion to what the contact's equations forbid: all of it if it sticks; the normal part if it
+/// slips, which is corrected along the edge of the cone.
 void Imbalance::keep_equations(const ContactProblem& problem, Index contact) noexcept {
   if (mode_[contact] == Mode::stick) return;
   Vec3 left = Vec3::Zero();

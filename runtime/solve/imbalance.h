@@ -1,4 +1,4 @@
-// What forces that do not solve a contact problem lack.
+// Error estimate for forces that do not solve a contact problem.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,18 @@
 
 namespace palpate {
 
-/// Where a solver was cut short: a step of Newton's method on Alart & Curnier's equations (1991) from its
-/// forces, in two parts. The forces change at once by `change`: those of contacts that are to open go, those
-/// that slip go to the cone's edge, and one that penetrates without force takes what closes it alone. What
-/// the contacts that are closed have to undo then is `motion`. With y, the change of the forces by a motion
-/// of the tool along an axis (a solver's `derivative`), the sum of the forces along that axis lacks
+/// Newton step on Alart & Curnier's equations (1991) from the forces of a solver that was stopped early, in
+/// two parts. The forces change at once by `change`: those of opening contacts vanish, those of slipping ones
+/// go to the edge of the cone, and a penetrating contact without force gets the force that closes it alone.
+/// The closed contacts then have to correct `motion`. With y, the change of the forces by a motion of the
+/// tool along an axis (a solver's `derivative`), the error of the sum of the forces along that axis is
 ///   sum of `change` along it + y . motion,
-/// as W is symmetric. All memory is taken at construction.
+/// because W is symmetric. All memory is allocated at construction.
 class Imbalance {
  public:
   Imbalance(Index max_contacts, Index max_rows);
 
-  /// Takes problem.lambda as a solver left it; two products with W.
+  /// Evaluates problem.lambda as a solver left it, with two products with W.
   void find(const ContactProblem& problem) noexcept;
 
   [[nodiscard]] std::span<const double> change() const noexcept { return change_; }  ///< [rows] [N]
@@ -37,9 +37,9 @@ class Imbalance {
 
   std::vector<double> change_;  // [max rows]
   std::vector<double> motion_;  // [max rows]
-  std::vector<double> step_;    // [max rows] forces that W is multiplied by
+  std::vector<double> step_;    // [max rows] forces to be multiplied by W
   std::vector<Mode> mode_;      // [max contacts]
-  std::vector<Vec3> edge_;      // [max contacts] slipping: the cone's edge
+  std::vector<Vec3> edge_;      // [max contacts] slipping: edge of the cone
   double residual_ = 0.0;
 };
 

@@ -13,10 +13,10 @@ constexpr double eps = std::numeric_limits<double>::epsilon();
 constexpr double largest = std::numeric_limits<double>::max();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// Of Newton's method, each of which at least halves the step or the bracket.
+// Limit of Newton steps, each of which at least halves the step or the bracket.
 constexpr int most_steps = 80;
 
-/// A point that runs from a (share 0) to b (share 1), as the disc sees it.
+/// Point that moves from a (share 0) to b (share 1), relative to the disc.
 class Runner {
  public:
   Runner(const Disc& disc, const Vec3& a, const Vec3& b) noexcept : radius_(disc.radius) {
@@ -33,7 +33,8 @@ class Runner {
     double rate;
   };
 
-  /// Half of the derivative of the squared distance by the share, which never falls, and its own derivative.
+  /// Half of the derivative of the squared distance with respect to the share, which is monotonic, and its
+  /// own derivative.
   [[nodiscard]] Slope slope(double share) const noexcept {
     Slope slope{(height_ + share * rise_) * rise_, rise_ * rise_};
     const Vec3 offset = offset_ + share * drift_;
@@ -48,7 +49,7 @@ class Runner {
     return slope;
   }
 
-  /// Whether it passes through the disc, and at which share.
+  /// True if the line passes through the disc; then also its share.
   bool cuts(double& share) const noexcept {
     const double end = height_ + rise_;
     if (!((height_ > 0.0 && end < 0.0) || (height_ < 0.0 && end > 0.0))) return false;
@@ -70,14 +71,14 @@ class Runner {
 
  private:
   double radius_;
-  double height_;  // over the disc's plane at share 0
+  double height_;  // above the disc's plane at share 0
   double rise_;
   Vec3 offset_;  // from the axis at share 0
   Vec3 drift_;
 };
 
-/// The share at which the slope is 0, or the end that is nearest: Newton's method within a bracket, which is
-/// halved where a step would leave it or the steps do not become shorter.
+/// Share at which the slope is 0, or the nearest end: Newton's method in a bracket, which is halved if a step
+/// would leave it or the steps do not become shorter.
 double nearest_share(const Runner& runner) noexcept {
   if (!(runner.slope(0.0).value < 0.0)) return 0.0;
   if (!(runner.slope(1.0).value > 0.0)) return 1.0;
@@ -108,17 +109,18 @@ NearestPoint pair_at(const Disc& disc, const Vec3& a, const Vec3& b, double shar
   return pair;
 }
 
-/// What of a vector lies in the disc's plane.
+/// Component of a vector in the disc's plane.
 Vec3 in_plane(const Disc& disc, const Vec3& v) noexcept {
   return v - disc.axis.dot(v) * disc.axis;
 }
 
-/// The disc's diameter that is steepest to a triangle. Where that has no area or is parallel, any.
+/// Diameter of the disc that is steepest relative to a triangle. Arbitrary if the triangle has no area or is
+/// parallel.
 std::pair<Vec3, Vec3> steepest_diameter(const Disc& disc, const Vec3& a, const Vec3& b,
                                         const Vec3& c) noexcept {
   const Vec3 slope = in_plane(disc, (b - a).cross(c - a));
   const double size = slope.norm();
-  // Taken into the plane twice: of a slope that is small against the normal, rounding is a large part.
+  // Projected twice: for a slope that is small relative to the normal, rounding is significant.
   Vec3 along = in_plane(disc, slope / size);
   const double length = along.norm();
   along = length > 0.5 && length < 2.0 ? Vec3(along / length) : disc.axis.unitOrthogonal();
@@ -159,8 +161,8 @@ NearestPoint nearest_of_disc_and_triangle(const Disc& disc, const Vec3& a, const
     edge.weights[j] = weights[1];
     best = edge;
   }
-  // Within the face it is the rim that is nearest, where it is lowest over the triangle, or the disc cuts the
-  // triangle at least in the middle of a chord.
+  // Inside the face the nearest point is on the rim, where it is lowest above the triangle, or the disc cuts
+  // the triangle at least in the middle of a chord.
   const auto [p, q] = steepest_diameter(disc, a, b, c);
   const NearestPoint in_face = nearest_of_segment_and_triangle(p, q, a, b, c);
   const bool is_in_face = *std::min_element(in_face.weights.begin(), in_face.weights.end()) > 0.0;

@@ -12,11 +12,11 @@ using Corners = std::array<Vec3, 3>;
 
 constexpr double largest = std::numeric_limits<double>::max();
 
-// A triangle whose height is less than this share of its longest edge is thin: rounding moves points of its
-// face by much more than itself.
+// Threshold of a triangle's height relative to its longest edge: rounding moves points of the face of a
+// thinner one by much more than itself.
 constexpr double thin = 1e-4;
 
-/// The pair of points with its distance, which is finite even where its square overflows.
+/// Pair of points with its distance, which is finite even if its square overflows.
 NearestPoint pair_of(const Weights& weights, const Vec3& on_simplex, const Vec3& on_core) noexcept {
   return {weights, on_simplex, on_core, std::min((on_simplex - on_core).squaredNorm(), largest)};
 }
@@ -29,7 +29,7 @@ Vec3 between(const Vec3& a, const Vec3& b, double t) noexcept {
   return (1.0 - t) * a + t * b;
 }
 
-/// Share t of the line from a to b, 0 to 1, at which it is nearest to p; 0 where it has no length.
+/// Share t of the line from a to b, 0 to 1, of the point nearest to p; 0 if it has no length.
 double nearest_share(const Vec3& p, const Vec3& a, const Vec3& b) noexcept {
   const Vec3 ab = b - a;
   const double t = ab.dot(p - a) / ab.squaredNorm();
@@ -51,7 +51,7 @@ NearestPoint nearest_of_corner(const Vec3& p, const Vec3& q, const Corners& corn
   return pair_of(weights, corner[i], between(p, q, nearest_share(corner[i], p, q)));
 }
 
-/// Keeps the common perpendicular of segment p q and edge i j where it meets both between their ends.
+/// Keeps the common perpendicular of segment p q and edge i j if it meets both between their ends.
 void keep_nearer_perpendicular(NearestPoint& best, const Vec3& p, const Vec3& q, const Corners& corner,
                                std::size_t i, std::size_t j) noexcept {
   const Vec3 pq = q - p;
@@ -67,7 +67,7 @@ void keep_nearer_perpendicular(NearestPoint& best, const Vec3& p, const Vec3& q,
   keep_nearer(best, pair_of(weights, between(corner[i], corner[j], t), between(p, q, s)));
 }
 
-/// The plane of a triangle.
+/// Plane of a triangle.
 class Face {
  public:
   explicit Face(const Corners& corner) noexcept
@@ -77,7 +77,7 @@ class Face {
         ca_(corner[0] - corner[2]),
         n_(ca_.cross(ab_)) {}
 
-  /// Whether weights within the face are not to be trusted alone. True without area.
+  /// True if weights inside the face are unreliable on their own. True without area.
   [[nodiscard]] bool is_thin() const noexcept {
     const double squared_length = std::max({ab_.squaredNorm(), bc_.squaredNorm(), ca_.squaredNorm()});
     return !(n_.squaredNorm() > thin * thin * squared_length * squared_length);
@@ -86,7 +86,7 @@ class Face {
   /// Distance of p from the plane times twice the area, positive on the outward side.
   [[nodiscard]] double side(const Vec3& p) const noexcept { return n_.dot(p - corner_[0]); }
 
-  /// Weights of p's foot on the plane; false unless that is inside the triangle.
+  /// Computes the weights of p's projection on the plane; false unless it is inside the triangle.
   bool foot(const Vec3& p, Weights& weights) const noexcept {
     const double a = n_.dot(bc_.cross(p - corner_[1]));
     const double b = n_.dot(ca_.cross(p - corner_[2]));
@@ -118,7 +118,7 @@ NearestPoint nearest_on_corners(const Vec3& p, const Corners& corner, const Face
   return best;
 }
 
-/// Where segment p q passes through the face; false where it does not.
+/// Computes the intersection of segment p q with the face; false if there is none.
 bool cut(const Vec3& p, const Vec3& q, const Face& face, NearestPoint& result) noexcept {
   const double side_of_p = face.side(p);
   const double side_of_q = face.side(q);

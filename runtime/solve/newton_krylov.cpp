@@ -14,13 +14,13 @@
 namespace palpate {
 namespace {
 
-constexpr Index width = 16;  // vectors end on whole registers
+constexpr Index width = 16;  // vectors are padded to whole registers
 
 Index padded(Index rows) noexcept {
   return (rows + width - 1) / width * width;
 }
 
-/// y += the first `rows` rows of A by their factors, three of them in one pass.
+/// y += the first `rows` rows of A times their factors, three of them in one pass.
 void add_rows(const float* __restrict A, std::ptrdiff_t stride, int rows, const Vec3& factors,
               float* __restrict y, std::ptrdiff_t columns) noexcept {
   const Eigen::Vector3f by = factors.cast<float>();
@@ -30,7 +30,7 @@ void add_rows(const float* __restrict A, std::ptrdiff_t stride, int rows, const 
   }
 }
 
-/// out = A v of a matrix by rows, `size` by `size` of 3 by 3.
+/// out = A v for a row-major matrix, `size` by `size` of 3 by 3.
 void multiply_small(const std::array<float, 9>& A, int size, const float* v, float* out) noexcept {
   if (size == 3) {
     const float v0 = v[0], v1 = v[1], v2 = v[2];
@@ -62,15 +62,15 @@ Vec3 tangential(const Vec3& v, const Vec3& n) noexcept {
   return v - n.dot(v) * n;
 }
 
-/// How rounds of sweeps and steps of Newton's method get on.
+/// Progress of the rounds of sweeps and Newton steps.
 struct Progress {
   double last = std::numeric_limits<double>::infinity();  // smallest residual after a round
-  int failures = 0;                                       // steps that gained little
-  bool newton = false;                                    // the first round has none
+  int failures = 0;                                       // steps with little gain
+  bool newton = false;                                    // the first round has no Newton step
 
   [[nodiscard]] bool has_step() const noexcept { return newton && failures < tuning.many.most_failures; }
 
-  /// Takes down what residual a round has reached.
+  /// Records the residual reached by a round.
   void note(double reached) noexcept {
     if (newton && reached > tuning.many.gain * last) ++failures;
     if (!(reached <= 4.0 * last)) failures = tuning.many.most_failures;
@@ -104,7 +104,7 @@ bool NewtonKrylov::was_easy() const noexcept {
   return work_ <= tuning.many.easy_share * tuning.many.most_work;
 }
 
-/// Multiplications of a product with W, and what it costs beside them.
+/// Multiplications of a product with W, including its overhead.
 double NewtonKrylov::product_work() const noexcept {
   return static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
 }
@@ -125,17 +125,17 @@ void NewtonKrylov::change_force(const Contact& contact, const Vec3& change) noex
   for (int i = 0; i < contact.rows; ++i) f_[contact.first + i] += change[i];
 }
 
-/// Its forces are zero, and not what rounding leaves of them.
+/// Sets the forces to exactly zero, without rounding residue.
 void NewtonKrylov::open(const Contact& contact) noexcept {
   std::fill_n(f_.begin() + contact.first, contact.rows, 0.0);
 }
 
-/// Rows that are there for a contact are gone with it.
+/// A row that belongs to a contact is absent with it.
 bool NewtonKrylov::is_present(const Contact& contact) const noexcept {
   return contact.owner < 0 || !at(f_, contacts_[static_cast<std::size_t>(contact.owner)]).isZero(0.0);
 }
 
-/// The guess is in the cone, but for a normal that has turned since.
+/// Moves the guess into the cone, from which the normal may have rotated.
 void NewtonKrylov::enter_cone(const Contact& contact) noexcept {
   const Vec3 f = at(f_, contact);
   const double normal = contact.n.dot(f);
@@ -147,7 +147,7 @@ void NewtonKrylov::enter_cone(const Contact& contact) noexcept {
     change_force(contact, (contact.mu * normal / length - 1.0) * tangent);
 }
 
-/// All contacts enter their cones; rows that are there for a contact without force go with it.
+/// Moves all contacts into their cones; removes rows that belong to a contact without force.
 void NewtonKrylov::enter_cones() noexcept {
   const std::span<const Contact> all = std::span(contacts_).first(static_cast<std::size_t>(count_));
   for (const Contact& contact : all) {
@@ -191,7 +191,7 @@ void NewtonKrylov::load(ContactProblem& problem) noexcept {
   std::fill(r_.begin() + rows_, r_.begin() + padded_rows_, 0.0F);
 }
 
-/// r = b + W (f - guess). The guess is in the cones, but for normals that have turned since.
+/// Computes r = b + W (f - guess). The guess is inside the cones, except for normals that have rotated.
 void NewtonKrylov::find_motion(const ContactProblem& problem) noexcept {
   bool moved = false;
   std::fill_n(change_.begin(), padded_rows_, 0.0F);
@@ -203,15 +203,15 @@ void NewtonKrylov::find_motion(const ContactProblem& problem) noexcept {
   if (moved) move_by_change(problem);
 }
 
-/// r by what the forces change by.
+/// Updates r by the change of the forces.
 void NewtonKrylov::move_by_change(const ContactProblem& problem) noexcept {
   multiply(compliance(problem), change_.data(), product_.data());
   count_product();
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) r_[i] += product_[i];
 }
 
-/// On the cone, with r_n = 0 and r_t opposed to the tangential force: its direction by Newton's method on the
-/// angle.
+/// Returns the force on the cone with r_n = 0 and r_t opposite to the tangential force; its direction is
+/// found by Newton's method on the angle.
 Vec3 NewtonKrylov::slipping_force(const Contact& contact, const Vec3& f, const Vec3& r,
                                   const Vec3& sticking) const noexcept {
   const Vec3& n = contact.n;
@@ -248,7 +248,7 @@ Vec3 NewtonKrylov::slipping_force(const Contact& contact, const Vec3& f, const V
   return force;
 }
 
-/// What a contact's force changes by to solve its equations, the others being as they are.
+/// Returns the change of a contact's force that solves its equations, with the others fixed.
 Vec3 NewtonKrylov::suiting_change(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept {
   Vec3 to_stick = -(contact.inverse * r);
   if (contact.kind == Kind::held) return to_stick;
@@ -291,7 +291,7 @@ Vec3 NewtonKrylov::difference(const Contact& contact, const Vec3& f, const Vec3&
   return f - normal * contact.n - tangent;
 }
 
-/// Starts from what is predicted, if that is nearer to the solution than the guess alone.
+/// Starts from the prediction if it is closer to the solution than the guess alone.
 void NewtonKrylov::predict(const ContactProblem& problem) noexcept {
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) f_[i] += problem.prediction[i];
   enter_cones();
@@ -321,7 +321,7 @@ void NewtonKrylov::find_residual() noexcept {
   residual_ = std::sqrt(worst) / largest_force_;
 }
 
-/// Whether a contact is there, or will be by its force and motion.
+/// True if a contact is closed, or would be by its force and motion.
 bool NewtonKrylov::may_press(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept {
   if (contact.kind == Kind::absent) return false;
   if (contact.kind == Kind::held) return is_present(contact);
@@ -353,7 +353,7 @@ void NewtonKrylov::choose_modes() noexcept {
   }
 }
 
-/// Forces of open contacts go, those that slip go to the cone's edge.
+/// Removes the forces of open contacts, and moves those of slipping ones to the edge of the cone.
 void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
   bool moved = false;
   for (Index k = 0; k < count_; ++k) {
@@ -373,7 +373,7 @@ void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
   if (moved) count_product();
 }
 
-/// The contacts that are not open, each with what it gives way itself as its preconditioner.
+/// Collects the contacts that are not open, each with its own compliance as preconditioner.
 void NewtonKrylov::reduce() noexcept {
   active_ = 0;
   for (Index k = 0; k < count_; ++k) {
@@ -406,21 +406,21 @@ void NewtonKrylov::reduce() noexcept {
   }
 }
 
-/// Forces x [rows] by the unknowns: along the cone's edge and across where a contact slips.
+/// Computes forces x [rows] from the unknowns: for a slipping contact along the edge of the cone and across.
 void NewtonKrylov::fill_image(const float* y, float* x) const noexcept {
   std::fill_n(x, padded_rows_, 0.0F);
   for (const Reduced& contact : std::span(reduced_).first(active_))
     multiply_small(contact.image, contact.rows, y + contact.first, x + contact.first);
 }
 
-/// The equations' left sides by motions along the rows.
+/// Computes the left-hand sides of the equations from motions along the rows.
 void NewtonKrylov::test(const float* motion, float* out) const noexcept {
   std::fill_n(out, padded_rows_, 0.0F);
   for (const Reduced& contact : std::span(reduced_).first(active_))
     multiply_small(contact.test, contact.rows, motion + contact.first, out + contact.first);
 }
 
-/// v = W x of the first systems, in step, so that W is read once for all of them.
+/// Computes v = W x for the first systems together, so that W is read once.
 void NewtonKrylov::multiply_by_compliance(const ContactProblem& problem, int systems) noexcept {
   if (systems == 1) {
     multiply(compliance(problem), x_.data(), v_.data());
@@ -430,7 +430,7 @@ void NewtonKrylov::multiply_by_compliance(const ContactProblem& problem, int sys
   count_product();
 }
 
-/// GMRES on the reduced systems that have begun.
+/// Runs GMRES on the reduced systems that have begun.
 void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noexcept {
   const std::span<Gmres> all = std::span(gmres_).first(static_cast<std::size_t>(systems));
   const auto is_done = [](const Gmres& gmres) { return gmres.done(); };
@@ -463,7 +463,7 @@ void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noe
   }
 }
 
-/// Steps of GMRES that the budget has room for.
+/// GMRES steps allowed by the budget.
 int NewtonKrylov::most_steps() const noexcept {
   return static_cast<int>(std::clamp<double>(tuning.many.step_work / product_work(), tuning.many.fewest_steps,
                                              tuning.many.most_steps));
@@ -502,7 +502,7 @@ void NewtonKrylov::take_best() noexcept {
   std::copy_n(best_r_.begin(), padded_rows_, r_.begin());
 }
 
-/// What another round costs at least, with a step of Newton's method or without [multiplications].
+/// Least cost of another round, with or without a Newton step [multiplications].
 double NewtonKrylov::round_work(bool with_step) const noexcept {
   return (with_step ? tuning.many.fewest_steps : tuning.many.sweeps) * product_work();
 }
@@ -520,7 +520,7 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
       std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, tuning.many.tolerance);
   if (best_ > wanted) predict(problem);
   Progress progress;
-  // Rest is reached over ticks, each from where the last one ended: no step is too late there.
+  // Rest is reached over several ticks, each starting from the last one: no step is too late for that.
   const bool moves = problem.moves || wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
@@ -570,7 +570,7 @@ bool NewtonKrylov::improve_few(ContactProblem& problem) noexcept {
   return solved;
 }
 
-/// The unknowns y of each change by the guess in dlambda. False where that is zero.
+/// Computes the unknowns y of each change from the guess in dlambda. False if all are zero.
 bool NewtonKrylov::fill_guess(std::span<const double> dlambda, int changes) noexcept {
   bool found = false;
   for (int s = 0; s < changes; ++s) {

@@ -1,4 +1,4 @@
-// Contact of many points.
+// Solver for contact with many points.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,42 +12,42 @@
 
 namespace palpate {
 
-/// Solves a ContactProblem of many contacts: block Gauss-Seidel sweeps, each contact solved exactly with the
-/// others as they are, and between them steps of a semismooth Newton method on Alart & Curnier's equations
-/// (1991) that has three unknowns at a contact that sticks, two at one that slips and one without friction,
-/// and is solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps make the forces smooth and keep them
-/// in the cones; Newton's steps settle what sweeps are slow at. It starts from the guess in lambda and what
-/// is predicted of its change, or without that where it is no better, and costs next to nothing where the
-/// guess is the solution. W and all that is long is in single precision: forces and
-/// motions change little from tick to tick. docs/decisions has what it was compared with. All memory is taken
-/// at construction.
+/// Solves a ContactProblem with many contacts: block Gauss-Seidel sweeps, each contact solved exactly with
+/// the others fixed, and between them steps of a semismooth Newton method on Alart & Curnier's equations
+/// (1991) with three unknowns at a sticking contact and two at a slipping one, or one without friction,
+/// solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps smooth the forces and keep them inside the
+/// cones; Newton steps remove the errors for which sweeps converge slowly. It starts from the guess in lambda
+/// plus its predicted change, or from the guess alone if that is better, and costs almost nothing if the
+/// guess is the solution. W and all long vectors are in single precision: forces and motions change little
+/// from tick to tick. docs/decisions has the comparison with other methods. All memory is allocated at
+/// construction.
 ///
-/// Residual: the largest difference of the two sides of the equations at a contact, against the largest
-/// force. What is felt, the sum, is right to a tenth of it: what is left is rough, and cancels.
+/// Residual: the largest difference of the two sides of the equations at a contact, relative to the largest
+/// force. The sum of the forces, which is felt, is accurate to a tenth of that: the remaining errors are
+/// rough and cancel.
 class NewtonKrylov {
  public:
   NewtonKrylov(Index max_contacts, Index max_rows);
 
-  /// Fills problem.lambda from the guess in it. False when the residual is over ManyTuning's `accepted` at
-  /// the end of the budget: lambda is then the best that was found, and in the cones.
+  /// Computes problem.lambda from the guess in it. False if the residual exceeds ManyTuning's `accepted` at
+  /// the end of the budget: lambda is then the best found, inside the cones.
   bool solve(ContactProblem& problem) noexcept;
 
-  /// Makes lambda of a problem of few contacts, W in double precision, better: to what single precision tells
-  /// apart, as `solve` does. False when there is no room, or the residual is over `accepted`.
+  /// Improves lambda of a problem of few contacts, with W in double precision, to single-precision accuracy,
+  /// as `solve` does. False if the capacity is exceeded, or the residual exceeds `accepted`.
   bool improve_few(ContactProblem& problem) noexcept;
 
-  /// What lambda changes by when b does, to first order, for up to three changes: `db` and `dlambda`
-  /// [changes x rows]; dlambda holds a guess before, which may be zero. Contacts stay open, sticking or
-  /// slipping as they are.
+  /// Derivative of lambda with respect to b, for up to three changes: `db` and `dlambda` [changes x rows];
+  /// dlambda holds a guess before, which may be zero. Contacts stay open, sticking or slipping as they are.
   void derivative(const ContactProblem& problem, int changes, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
-  [[nodiscard]] int products() const noexcept { return products_; }  ///< with W, of the last `solve`
-  [[nodiscard]] int rounds() const noexcept { return rounds_; }      ///< of the last `solve`
+  [[nodiscard]] int products() const noexcept { return products_; }  ///< products with W in the last `solve`
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }      ///< rounds of the last `solve`
   [[nodiscard]] double residual() const noexcept {
     return residual_;
   }  ///< of the last `solve` [largest force]
-  /// Whether `solve` left time for another.
+  /// True if `solve` left time for another pass.
   [[nodiscard]] bool was_easy() const noexcept;
   /// r [rows] at the end of the last `solve` [m].
   [[nodiscard]] std::span<const float> motion() const noexcept { return r_; }
@@ -64,24 +64,24 @@ class NewtonKrylov {
     Kind kind = Kind::held;
     Mode mode = Mode::open;
     double mu = 0.0;
-    double w = 0.0;                                         // mean of W's diagonal
-    Vec3 n = Vec3::Zero();                                  // normal in the rows' axes
-    Eigen::Matrix3d D = Eigen::Matrix3d::Identity();        // W at the contact itself
-    Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // of D
-    Vec3 e = Vec3::Zero();                                  // slipping: direction of the tangential force,
-    Vec3 across = Vec3::Zero();                             // and across it
-    double turning = 0.0;                                   // slipping: motion across by a force across [m/N]
+    double w = 0.0;                                         // mean of the diagonal of W
+    Vec3 n = Vec3::Zero();                                  // normal in the axes of the rows
+    Eigen::Matrix3d D = Eigen::Matrix3d::Identity();        // block of W for the contact itself
+    Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // inverse of D
+    Vec3 e = Vec3::Zero();                                  // slipping: direction of the tangential force
+    Vec3 across = Vec3::Zero();                             // slipping: direction across it
+    double turning = 0.0;                                   // slipping: motion across per force across [m/N]
   };
 
-  /// A contact that is not open as GMRES has it: three unknowns where it sticks, two where it slips. Matrices
-  /// are stored by rows.
+  /// Contact that is not open, in the reduced system of GMRES: three unknowns if it sticks, two if it slips.
+  /// Matrices are row-major.
   struct Reduced {
     Index first = 0;  // row
     int rows = 0;
-    std::array<float, 9> image{};    // forces by the unknowns
-    std::array<float, 9> test{};     // equations by the motion
-    std::array<float, 9> inverse{};  // unknowns by the equations, of the contact alone
-    float turning = 0.0F;            // second equation by the second unknown
+    std::array<float, 9> image{};    // forces from unknowns
+    std::array<float, 9> test{};     // equations from motions
+    std::array<float, 9> inverse{};  // unknowns from equations, for the contact alone
+    float turning = 0.0F;            // second equation from the second unknown
   };
 
   void load(ContactProblem& problem) noexcept;
@@ -118,23 +118,23 @@ class NewtonKrylov {
   [[nodiscard]] int most_steps() const noexcept;
   void take_best() noexcept;
 
-  std::ptrdiff_t stride_;  // of vectors
+  std::ptrdiff_t stride_;  // length of vectors
   std::vector<Contact> contacts_;
   Index count_ = 0;
   Index rows_ = 0;
   std::vector<double> f_,
-      best_f_;  // [rows] forces: the sum of single-precision changes; of the smallest residual
+      best_f_;  // [rows] forces: the sum of single-precision changes; those of the smallest residual
   std::vector<float> r_, best_r_;          // [rows] motion
   std::vector<double> few_b_, few_guess_;  // [rows] of a problem of few contacts
   std::vector<float> change_, product_;
   std::ptrdiff_t padded_rows_ = 0;
-  std::vector<Reduced> reduced_;  // [max_contacts], the first active_
-  std::size_t active_ = 0;        // contacts that are not open
+  std::vector<Reduced> reduced_;  // [max_contacts] the first active_ are used
+  std::size_t active_ = 0;        // number of contacts that are not open
   std::vector<Gmres> gmres_;      // [most_changes]
-  std::vector<float> x_, v_;      // [most_changes x stride] forces, motions by them
+  std::vector<float> x_, v_;      // [most_changes x stride] forces, and motions by them
   std::vector<float> y_;          // [most_changes x stride] unknowns
   std::vector<float> step_;       // [stride]
-  std::vector<float> motions_;    // [most steps x stride] by GMRES' images, of one system
+  std::vector<float> motions_;    // [most steps x stride] motions by the images of GMRES, for one system
   int products_ = 0;
   double work_ = 0.0;  // multiplications
   int rounds_ = 0;

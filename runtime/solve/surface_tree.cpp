@@ -14,16 +14,16 @@ namespace palpate {
 namespace {
 
 constexpr Index leaf_size = 4;
-// Each split halves the simplices, so that no leaf is deeper than the bits of their number.
+// Each split halves the number of simplices, so the depth is at most the number of bits of that number.
 constexpr std::size_t max_depth = 32;
-constexpr std::size_t word_bits = 64;  // of marks
+constexpr std::size_t word_bits = 64;  // bits per word of marks
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-/// Between two boxes, 0 where they overlap; finite even where it overflows.
+/// Squared distance between two boxes, 0 if they overlap; finite even if it overflows.
 double squared_gap(const Vec3& lower, const Vec3& upper, const Vec3& other_lower,
                    const Vec3& other_upper) noexcept {
   const Vec3 gap = (lower - other_upper).cwiseMax(other_lower - upper).cwiseMax(0.0);
@@ -125,7 +125,7 @@ void SurfaceTree::mark(Index cell) noexcept {
 }
 
 void SurfaceTree::refit() noexcept {
-  // From the last cell to the first: children come before their parents.
+  // From the last cell to the first: children are stored after their parents.
   while (marks_end_ > 0) {
     const std::uint64_t word = marks_[marks_end_ - 1];
     if (word == 0) {

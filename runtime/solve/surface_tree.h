@@ -1,4 +1,4 @@
-// Finds the part of a moving surface that is near a tool.
+// Spatial search on a moving surface.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,66 +11,65 @@
 
 namespace palpate {
 
-/// A simplex of the surface and the point of it that is nearest to something.
+/// Simplex of the surface with its point nearest to a query.
 struct NearestSimplex {
   Index simplex = -1;
   NearestPoint nearest;
 };
 
-/// Bounding volume tree over the simplices of a surface whose nodes move. Boxes are a margin larger than what
-/// they enclose, so that a node that moves less than that costs nothing, and those that move on cost the
-/// paths from the leaves around them to the root, once where paths join: there is never a refit of the whole
-/// tree, and boxes shrink as they grow. All memory is taken at construction; no call allocates.
+/// Bounding volume tree over the simplices of a surface whose nodes move. Boxes are larger than their
+/// contents by a margin: a node that moves by less costs nothing, others cost the paths from their leaves to
+/// the root, each cell once. The whole tree is never refitted, and boxes shrink as well as grow. All memory
+/// is allocated at construction; no call allocates.
 class SurfaceTree {
  public:
   /// `simplices`: [F * corners] nodes of triangles (corners = 3) or lines (2); `positions`: [S] of the nodes
-  /// [m]; `margin`: by how much boxes are larger than their simplices [m]. Throws Error when there is no
-  /// simplex, or unless margin > 0.
+  /// [m]; `margin`: enlargement of the boxes [m]. Throws Error if there is no simplex, or unless margin > 0.
   SurfaceTree(std::span<const Index> simplices, int corners, std::span<const Vec3> positions, double margin);
 
-  /// Where the node was last moved to [m].
+  /// Present position of the node [m].
   [[nodiscard]] const Vec3& position(Index node) const noexcept { return positions_[node]; }
 
-  /// Moves a node; `position` must be finite. The boxes follow in `refit`.
+  /// Moves a node; `position` must be finite. The boxes are updated by `refit`.
   void move(Index node, const Vec3& position) noexcept;
 
-  /// Boxes of all that has moved. Call before asking what is where.
+  /// Updates the boxes of all moved nodes. Call it before a query.
   void refit() noexcept;
 
-  /// A box around the whole surface, at most two margins larger than it on each side [m].
+  /// Box around the whole surface, at most two margins larger on each side [m].
   [[nodiscard]] Eigen::AlignedBox3d bounds() const noexcept {
     return {cells_.front().lower, cells_.front().upper};
   }
 
-  /// All simplices whose own box (without margin) is within `reach` of the box of segment p q, which must be
-  /// finite: fills `found` in an order that depends on nothing but the surface as it was at construction, and
-  /// returns how many there are, which may be more than fit.
+  /// Finds all simplices whose own box (without margin) is within `reach` of the box of segment p q, which
+  /// must be finite. Fills `found` in an order that depends only on the surface at construction, and returns
+  /// their number, which may exceed the size of `found`.
   [[nodiscard]] std::size_t near_segment(const Vec3& p, const Vec3& q, double reach,
                                          std::span<Index> found) const noexcept;
 
-  /// The simplex whose present position is nearest to a point, which must be finite.
+  /// Simplex nearest to a point, which must be finite, at present positions.
   [[nodiscard]] NearestSimplex nearest(const Vec3& point) const noexcept;
 
-  /// Whether a point (in the plane with z = 0) is inside the surface, which must be closed: by the
+  /// True if a point (in the plane with z = 0) is inside the surface, which must be closed: by the
   /// angle-weighted normal of the nearest vertex, edge or face (Baerentzen & Aanaes 2005). A point on the
-  /// surface, to rounding, is not inside.
+  /// surface, within rounding, is not inside.
   [[nodiscard]] bool inside(const Vec3& point) const noexcept;
 
  private:
-  /// Box of the simplices at places [first, first + count) of a leaf, or of two children: the cell that
-  /// follows and the one at that one's end.
+  /// Box of a leaf with the simplices at places [first, first + count), or of two children: the next cell and
+  /// the cell at the end of that one.
   struct Cell {
     Vec3 lower, upper;
-    Index end;     // the cell after all descendants
-    Index parent;  // -1: the root
+    Index end;     // cell after all descendants
+    Index parent;  // -1 for the root
     Index first;
-    Index count;  // 0: not a leaf
+    Index count;  // 0 if not a leaf
   };
 
   void build(std::span<const Vec3> centres, Index first, Index last, Index parent);
   void connect_nodes();
 
-  /// Sets the box of a cell by what it encloses; false if it was so before.
+  /// Sets the box of a cell from its contents; false if it is unchanged.
   bool fit(Index cell) noexcept;
   void mark(Index cell) noexcept;
 
@@ -84,15 +83,15 @@ class SurfaceTree {
   int corners_;
   double margin_;
   std::vector<Vec3> positions_;       // [S]
-  std::vector<Vec3> anchors_;         // [S] where the boxes think that the nodes are: never a margin away
-  std::vector<Cell> cells_;           // parents before children, first child next to its parent
-  std::vector<Index> numbers_;        // [F] simplex at each place in the order of the leaves
-  std::vector<Index> nodes_;          // [F * corners] of the simplex at each place
+  std::vector<Vec3> anchors_;         // [S] node positions known to the boxes: never a margin away
+  std::vector<Cell> cells_;           // parents before children, the first child right after its parent
+  std::vector<Index> numbers_;        // [F] simplex at each place, in the order of the leaves
+  std::vector<Index> nodes_;          // [F * corners] nodes of the simplex at each place
   std::vector<Index> leaf_;           // [F] cell of each place
-  std::vector<Index> first_place_;    // [S + 1] of each node in places_
-  std::vector<Index> places_;         // [F * corners] around each node, ascending
-  std::vector<std::uint64_t> marks_;  // a bit for each cell that is to be fitted
-  std::size_t marks_end_ = 0;         // no word of marks from here on has any
+  std::vector<Index> first_place_;    // [S + 1] begin of each node's entries in places_
+  std::vector<Index> places_;         // [F * corners] places around each node, ascending
+  std::vector<std::uint64_t> marks_;  // one bit per cell to be fitted
+  std::size_t marks_end_ = 0;         // end of the words with marks
 };
 
 }  // namespace palpate

@@ -27,7 +27,7 @@ void store(Lanes value, float* to) noexcept {
   std::memcpy(to, &value, sizeof value);
 }
 
-/// Four lanes with the same total.
+/// Four lanes, each with the total.
 #ifdef __AVX__
 Four folded(Lanes value) noexcept {
   return __builtin_shufflevector(value, value, 0, 1, 2, 3) +
@@ -44,7 +44,7 @@ struct Sums {
   Lanes first{}, second{}, third{}, fourth{};
 };
 
-/// The total of the lanes of each of the four.
+/// Totals of the lanes of each of the four.
 Four totals(const Sums& of) noexcept {
   const Four a = folded(of.first), b = folded(of.second), c = folded(of.third), d = folded(of.fourth);
   const Four ab = __builtin_shufflevector(a, b, 0, 1, 4, 5) + __builtin_shufflevector(a, b, 2, 3, 6, 7);
@@ -52,7 +52,7 @@ Four totals(const Sums& of) noexcept {
   return __builtin_shufflevector(ab, cd, 0, 2, 4, 6) + __builtin_shufflevector(ab, cd, 1, 3, 5, 7);
 }
 
-/// y += a square of the diagonal times x: its rows are its columns.
+/// y += a square on the diagonal times x: its rows are also its columns.
 void add_diagonal_block(const float* __restrict a, std::ptrdiff_t stride, const float* __restrict x,
                         float* __restrict y) noexcept {
   for (std::ptrdiff_t i = 0; i < block; ++i) {
@@ -61,9 +61,9 @@ void add_diagonal_block(const float* __restrict a, std::ptrdiff_t stride, const 
   }
 }
 
-/// y of four rows beginning at `i` += their entries from `begin` on, times x; and y there += their transpose.
-/// Sums of two runs of columns go on beside each other, as one would wait for itself. The four rows that come
-/// next are asked for early: rows are too short for the processor to see where it goes on.
+/// y of four rows starting at `i` += their entries from `begin` on, times x; and y += their transpose. Two
+/// runs of columns are summed concurrently, as the sum of one would wait for itself. The next four rows are
+/// prefetched: rows are too short for the hardware prefetcher.
 void add_four_rows(const float* __restrict a, std::ptrdiff_t stride, const float* __restrict x,
                    float* __restrict y, std::ptrdiff_t i, std::ptrdiff_t begin, std::ptrdiff_t end) noexcept {
   const float x0 = x[i], x1 = x[i + 1], x2 = x[i + 2], x3 = x[i + 3];
@@ -93,7 +93,7 @@ void add_four_rows(const float* __restrict a, std::ptrdiff_t stride, const float
   for (int j = 0; j < 4; ++j) y[i + j] += sums[j];
 }
 
-/// As add_four_rows, of two rows and three vectors.
+/// Does the same as add_four_rows, for two rows and three vectors.
 void add_two_rows(const float* __restrict a, std::ptrdiff_t stride, const float* __restrict x,
                   float* __restrict y, std::ptrdiff_t apart, std::ptrdiff_t i, std::ptrdiff_t begin,
                   std::ptrdiff_t end) noexcept {
@@ -125,7 +125,7 @@ void add_two_rows(const float* __restrict a, std::ptrdiff_t stride, const float*
   yc[i + 1] += of_third[1];
 }
 
-/// The rows from `begin` on, fewer than a block: beyond them there is nothing.
+/// Adds the rows from `begin` on, fewer than a block and the last ones.
 void add_last_rows(const SymmetricRows& A, std::ptrdiff_t begin, const float* x, float* y) noexcept {
   for (std::ptrdiff_t i = begin; i < A.rows; ++i)
     add(A.entries + i * A.stride + begin, x[i], y + begin, A.columns - begin);

@@ -5,9 +5,9 @@
 
 namespace palpate {
 
-/// A symmetric matrix by rows: `rows` x `rows`, each row `stride` long and zero from `rows` to `columns`, a
-/// multiple of 8. Products read the entries on and right of the diagonal, each once, as beyond some hundred
-/// rows the matrix does not fit the cache nearest to the processor.
+/// Symmetric matrix, row-major: `rows` x `rows`, each row `stride` long and zero from `rows` to `columns`, a
+/// multiple of 8. Products read each entry on and right of the diagonal once, since beyond some hundred rows
+/// the matrix exceeds the L1 cache.
 struct SymmetricRows {
   const float* entries;
   std::ptrdiff_t stride;
@@ -18,7 +18,7 @@ struct SymmetricRows {
 /// y = A x; both [columns], x zero from `rows` on.
 void multiply(const SymmetricRows& A, const float* x, float* y) noexcept;
 
-/// Y = A X of three vectors, `apart` from each other; A is read once.
+/// Y = A X for three vectors at distance `apart`; A is read once.
 void multiply_three(const SymmetricRows& A, const float* x, float* y, std::ptrdiff_t apart) noexcept;
 
 }  // namespace palpate

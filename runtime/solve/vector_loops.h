@@ -1,12 +1,12 @@
-// Loops over rows of the tick's small matrices. Not Eigen's: its sums depend on how memory is aligned, and
-// equal states are to go the same way to the last bit.
+// Loops over rows of the tick's small matrices. Eigen is not used: the rounding of its sums depends on memory
+// alignment, and equal states must give equal bits.
 #pragma once
 
 #include <cstddef>
 
 namespace palpate {
 
-/// a . b
+/// a . b.
 template <typename Real>
 Real dot(const Real* __restrict a, const Real* __restrict b, std::ptrdiff_t count) noexcept {
   Real sum = 0;
@@ -15,15 +15,15 @@ Real dot(const Real* __restrict a, const Real* __restrict b, std::ptrdiff_t coun
   return sum;
 }
 
-/// y += factor x
+/// y += factor x.
 template <typename Real>
 void add(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff_t count) noexcept {
 #pragma omp simd
   for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
 }
 
-/// y += three rows x, `stride` apart, by their factors: y is read and written once. The three rows after them
-/// are asked for early, as they mostly come next.
+/// y += three rows x at distance `stride`, times their factors: y is read and written once. The three rows
+/// after them, usually needed next, are prefetched.
 template <typename Real>
 void add_three(const Real* __restrict x, std::ptrdiff_t stride, const Real* factors, Real* __restrict y,
                std::ptrdiff_t count) noexcept {
@@ -40,7 +40,7 @@ void add_three(const Real* __restrict x, std::ptrdiff_t stride, const Real* fact
     y[i] += f0 * x[i] + f1 * x[stride + i] + f2 * x[2 * stride + i];
 }
 
-/// y -= factor x
+/// y -= factor x.
 template <typename Real>
 void subtract(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff_t count) noexcept {
 #pragma omp simd
