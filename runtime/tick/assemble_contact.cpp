@@ -15,7 +15,7 @@
 namespace palpate {
 namespace {
 
-/// Places of the contact's nodes in the near field.
+/// Returns the places of the contact's nodes in the near field.
 std::array<Index, 3> places_of(const Body& body, const NearField& near,
                                const ContactPoint& contact) noexcept {
   std::array<Index, 3> places{-1, -1, -1};
@@ -42,7 +42,7 @@ ContactRow contact_row(const Body& body, const NearField& near, const ContactPoi
   return row;
 }
 
-/// Radius times the slope along a tangent, as a row; where the contact rolls, with the motion of the tool.
+/// Row of the radius times the slope along a tangent; if the contact rolls, including the motion of the tool.
 ContactRow tilt_row(const Body& body, const NearField& near, const ContactPoint& contact, double radius,
                     const Vec3& tangent) noexcept {
   ContactRow row;
@@ -54,7 +54,7 @@ ContactRow tilt_row(const Body& body, const NearField& near, const ContactPoint&
   return row;
 }
 
-/// Motion along a row of the body's surface going back to where it is without forces.
+/// Motion along a row if the body's surface returned to its position without forces.
 double unloading(const NearField& near, const ContactRow& row) noexcept {
   double motion = 0.0;
   for (std::size_t n = 0; n < 3; ++n) {
@@ -64,8 +64,8 @@ double unloading(const NearField& near, const ContactRow& row) noexcept {
   return motion;
 }
 
-/// Motion along a tangent of the surface itself since the tick before, which the places where the tick begins
-/// have in them already: what slides is the surface under the tool, by whatever it moves.
+/// Motion of the surface itself along a tangent since the last tick, which the initial positions of this tick
+/// include: slip is that of the surface under the tool, whatever moves it.
 double free_slip(const Body& body, const SurfaceState& surface, const ContactPoint& contact,
                  const Vec3& tangent) noexcept {
   if (!surface.motion.active()) return 0.0;
@@ -76,14 +76,14 @@ double free_slip(const Body& body, const SurfaceState& surface, const ContactPoi
   return motion;
 }
 
-/// The contact of the tick before that is the same one, null when there is none.
+/// Returns the same contact of the last tick; null if there is none.
 const ContactPoint* same_contact(const LastContacts& remembered, const ContactPoint& contact) noexcept {
   const Index number = remembered.number_of(contact.feature);
   return number < 0 ? nullptr : &remembered.contacts[number];
 }
 
-/// What a contact's tool and surface move against each other in the tick if no force changes, and how far
-/// they are apart: along n, the gap.
+/// Relative motion of a contact's tool and surface in the tick if no force changes, plus their distance; its
+/// component along n is the gap.
 Vec3 motion_of(const Body& body, const State& state, const Scratch& scratch, const ContactPoint& contact,
                const ContactPoint* last) noexcept {
   const ToolState& tool = state.tools[contact.tool];
@@ -98,7 +98,7 @@ Vec3 motion_of(const Body& body, const State& state, const Scratch& scratch, con
   return motion + slip;
 }
 
-/// What is known of a contact before it is in the problem.
+/// Data of a contact before it is added to the problem.
 UpcomingContact announce(const Body& body, const State& state, const Scratch& scratch,
                          const ContactPoint& contact, double least_gap) noexcept {
   UpcomingContact upcoming{.last = scratch.last.number_of(contact.feature)};
@@ -109,8 +109,8 @@ UpcomingContact announce(const Body& body, const State& state, const Scratch& sc
   return upcoming;
 }
 
-/// Who comes to each place, from the first that is not held on: contacts of the tick before keep theirs, so
-/// that their rows of W do; those that stay open come last.
+/// Chooses the contact at each place after the held ones: contacts of the last tick keep their places, so
+/// that their rows of W are kept; those that stay open come last.
 void choose_order(const State& state, AssemblyScratch& assembly) noexcept {
   const Index begin = state.held_count;
   const Index count = state.contact_count;
@@ -137,7 +137,7 @@ void choose_order(const State& state, AssemblyScratch& assembly) noexcept {
   }
 }
 
-/// Moves what stands at order[k] to k, along the cycles of the order, which is used up.
+/// Moves the contact at order[k] to k, along the cycles of the order, which is consumed.
 void bring_into_order(State& state, AssemblyScratch& assembly) noexcept {
   for (Index first = state.held_count; first < state.contact_count; ++first) {
     if (assembly.order[first] == first) continue;
@@ -156,8 +156,8 @@ void bring_into_order(State& state, AssemblyScratch& assembly) noexcept {
   }
 }
 
-/// Where contacts are many, those with friction and those that are held have a row for each axis: their
-/// compliance is that of their nodes as it stands, however the normals turn.
+/// With many contacts, those with friction and held ones have a row per axis, so that their compliance is
+/// that of their nodes and does not depend on the normals.
 void add_one_of_many(const Body& body, const SurfaceState& surface, Scratch& scratch,
                      const ContactPoint& contact, const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
@@ -175,7 +175,7 @@ void add_one_of_many(const Body& body, const SurfaceState& surface, Scratch& scr
   }
 }
 
-/// The responses of the tick before in the order of this one.
+/// Brings the responses of the last tick into the order of this one.
 void hand_on_responses(AssemblyScratch& assembly, Index count) noexcept {
   std::swap(assembly.response, assembly.last_response);
   for (Index k = 0; k < count; ++k) {
@@ -189,7 +189,8 @@ void hand_on_responses(AssemblyScratch& assembly, Index count) noexcept {
   assembly.response_count = count;
 }
 
-/// What the forces are expected to change by as the tools move: to first order, as linearise left it.
+/// Predicts the change of the forces by the motion of the tools, to first order, from the results of
+/// linearise.
 void predict(const State& state, Scratch& scratch) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
@@ -233,8 +234,8 @@ void add_one_of_few(const Body& body, const State& state, Scratch& scratch,
   }
 }
 
-/// The normal force by which a contact's tilt is judged: its own in the tick before, or, of one that has just
-/// become another vertex, edge or face, the mean of its tool's.
+/// Normal force for a contact's tilt: its own in the last tick or, if it has just become another vertex, edge
+/// or face, the mean of its tool's.
 double normal_force(const LastContacts& remembered, const ContactPoint& contact, const ContactPoint* last,
                     double closed) noexcept {
   if (last != nullptr) return last->force.dot(last->frame.col(0));
@@ -277,7 +278,7 @@ void add_tilt(const Body& body, const State& state, Scratch& scratch, Index numb
   }
 }
 
-/// Which of a row's nodes it has where it has one; -1 where it has more or none.
+/// Index of a row's node if it has exactly one; -1 otherwise.
 int only_node(const ContactRow& row) noexcept {
   int only = -1;
   for (int n = 0; n < 3; ++n) {
@@ -288,14 +289,14 @@ int only_node(const ContactRow& row) noexcept {
   return only;
 }
 
-/// Three numbers of a node, and a fourth beside them that counts for nothing.
+/// Three numbers of a node, and a fourth one that is ignored.
 using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
 
 void read(const double* numbers, Four& four) noexcept {
   std::memcpy(&four, numbers, sizeof(four));
 }
 
-/// W = J Xi J^T of rows that have one node each: of Xi only what is asked for.
+/// W = J Xi J^T for rows with one node each: uses only the required entries of Xi.
 template <int D>
 void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
@@ -329,7 +330,7 @@ void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
   }
 }
 
-/// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs a node.
+/// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs per node.
 template <int D>
 void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
@@ -363,7 +364,7 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
   }
 }
 
-/// What the body gives way at a contact along its normal, or where it gives way least of one that is held.
+/// Compliance of the body at a contact along its normal; for a held one the smallest of its rows.
 double least_give(const ContactProblem& problem, const ContactPoint& contact, Index k) noexcept {
   const Index first = problem.first_row(k);
   const Index rows = problem.rows_of(k);
@@ -381,7 +382,8 @@ double least_give(const ContactProblem& problem, const ContactPoint& contact, In
   return give;
 }
 
-/// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
+/// Marks the contacts that press on or hold a rigid part of the body. Call before the couplings are added to
+/// W.
 void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     ContactPoint& contact = state.contact_points[k];
@@ -394,7 +396,7 @@ bool is_coupled(const Tool& tool) noexcept {
   return std::isfinite(tool.coupling_stiffness) || std::isfinite(tool.coupling_torsion);
 }
 
-/// What the couplings give way: W += J_tool C_tool J_tool^T.
+/// Adds the compliance of the couplings: W += J_tool C_tool J_tool^T.
 void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   for (Index j = 0; j < problem.rows; ++j) {
@@ -411,8 +413,8 @@ void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
   }
 }
 
-/// Forces and moments of a tool's rows, each by the root of what the coupling gives way to it: one component
-/// after the other.
+/// Computes the forces and moments of a tool's rows, each multiplied by the root of the coupling's
+/// compliance: one component after the other.
 void fill_coupling(const Tool& tool, Index number, Scratch& scratch) noexcept {
   const double force_scale = 1.0 / std::sqrt(tool.coupling_stiffness);
   const double moment_scale = 1.0 / std::sqrt(tool.coupling_torsion);
@@ -429,7 +431,7 @@ void fill_coupling(const Tool& tool, Index number, Scratch& scratch) noexcept {
   }
 }
 
-/// What the couplings give way where contacts are many: in a W beside the body's, which stays as it is.
+/// Adds the compliance of the couplings for many contacts, in a second W; that of the body is unchanged.
 void couple_many(const State& state, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   const Index rows = problem.rows;
@@ -439,7 +441,7 @@ void couple_many(const State& state, Scratch& scratch) noexcept {
     fill_coupling(tool, static_cast<Index>(k), scratch);
     const float* __restrict c = scratch.assembly.coupling.data();
     for (Index j = 0; j < rows; ++j) {
-      const float* from = problem.single_row(j);  // itself from the second tool on
+      const float* from = problem.single_row(j);  // the sum so far, from the second tool on
       float* to = problem.single_W.data() + static_cast<std::ptrdiff_t>(j) * problem.single_stride;
       std::array<float, 6> by{};
       for (std::size_t axis = 0; axis < 6; ++axis) by[axis] = c[static_cast<Index>(axis) * rows + j];
@@ -454,7 +456,7 @@ void couple_many(const State& state, Scratch& scratch) noexcept {
   }
 }
 
-/// The part of a row's own compliance that is in double where precision is split: e^T left right^T e.
+/// Part of a row's own compliance that is in double for split precision: e^T left right^T e.
 double exact_compliance(const Body& body, const NearField& near, const ContactRow& row) noexcept {
   const Greens& greens = body.greens();
   if (!greens.split()) return 0.0;
@@ -488,10 +490,10 @@ double exact_compliance(const Body& body, const NearField& near, const ContactRo
 
 constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
 
-/// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
-/// indefinite. Where next to nothing gives way a rigid tool would be given a force beyond all measure: there
-/// it presses on a wall that gives way a little. What all that gives way along a tangent it gives from the
-/// force of the tick before: friction that sticks would creep by it in every tick.
+/// Nearly coincident contact points make W nearly singular; the rounding of Xi must not make it indefinite.
+/// Where the compliance is almost zero, a rigid tool would get an unbounded force; there it presses on a wall
+/// of small compliance. Along a tangent these compliances act relative to the force of the last tick;
+/// otherwise sticking friction would creep in every tick.
 void regularise(const Body& body, const State& state, Scratch& scratch) noexcept {
   const double rounding = body.greens().rounding();
   ContactProblem& problem = scratch.problem;
@@ -510,8 +512,8 @@ void regularise(const Body& body, const State& state, Scratch& scratch) noexcept
   }
 }
 
-/// What the surface moves along the rows by as the guess changes the forces that it is under: contact points
-/// have gone, or press on other nodes.
+/// Adds the motion of the surface along the rows by the change from the forces that act on it to the guess:
+/// contact points have vanished, or act on other nodes.
 void add_change_of_forces(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   const int d = near.dimension();
@@ -545,7 +547,7 @@ void add_change_of_forces(const NearField& near, Scratch& scratch) noexcept {
   }
 }
 
-/// What the couplings are stretched by the guess.
+/// Adds the stretch of the couplings by the guess.
 void add_stretch(const State& state, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
@@ -567,7 +569,7 @@ void add_stretch(const State& state, Scratch& scratch) noexcept {
   }
 }
 
-/// As `regularise`, in single precision.
+/// Does the same as `regularise`, in single precision.
 void regularise_many(const State& state, Scratch& scratch) noexcept {
   constexpr double rounding = 4.0 * std::numeric_limits<float>::epsilon();
   ContactProblem& problem = scratch.problem;
@@ -586,8 +588,8 @@ void regularise_many(const State& state, Scratch& scratch) noexcept {
   }
 }
 
-/// Whether the contacts are more than the direct solvers take: by the contact points, and by how many of them
-/// carried force.
+/// True if there are more contacts than the direct solvers take, by the number of contact points and of those
+/// that carried force.
 bool are_many(const State& state, const LastContacts& remembered) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
   const bool frictionless = std::all_of(contacts.begin(), contacts.end(), [](const ContactPoint& contact) {

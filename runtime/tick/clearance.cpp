@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-/// Whether no simplex is within a distance of a tool's core, nor cut by it.
+/// True if no simplex is within a distance of a tool's core or cut by it.
 bool keeps_distance(const Body& body, const SurfaceTree& tree, DetectionScratch& detection, const Tool& tool,
                     const Core& core, double distance) noexcept {
   const std::size_t count = near_core(tree, core, distance, detection.found);

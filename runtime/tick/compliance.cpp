@@ -14,7 +14,7 @@ BodyCompliance::BodyCompliance(Index max_rows, Index max_near_dofs)
       diagonal_(entries_.size()),
       response_(static_cast<std::size_t>(max_near_dofs)) {}
 
-/// Enters a row of J; whether it is another than before.
+/// Stores a row of J; returns true if it differs from the previous one.
 bool BodyCompliance::enter(const NearField& near, const ContactRow& row, Index i) noexcept {
   int count = 0;
   bool changed = false;
@@ -38,7 +38,7 @@ bool BodyCompliance::enter(const NearField& near, const ContactRow& row, Index i
   return changed;
 }
 
-/// A column of Xi J^T.
+/// Computes a column of Xi J^T.
 void BodyCompliance::respond(const NearField& near, Index row) noexcept {
   float* __restrict y = response_.data();
   const std::ptrdiff_t width = std::ptrdiff_t{near.dimension()} * near.count();
@@ -52,7 +52,7 @@ void BodyCompliance::respond(const NearField& near, Index row) noexcept {
   }
 }
 
-/// What rows [begin, end) have of the column.
+/// Computes rows [begin, end) of J times that column.
 void BodyCompliance::project(Index begin, Index end, int entries, float* __restrict w) const noexcept {
   const float* __restrict y = response_.data();
   std::fill(w + begin, w + end, 0.0F);

@@ -14,8 +14,8 @@
 namespace palpate {
 namespace {
 
-/// Same vertex, edge or face, same place on the same tool: the same number. Faces have the simplex's number;
-/// edges and vertices those of their nodes.
+/// Returns the identifier of a vertex, edge or face and a place on the tool. Faces have the number of their
+/// simplex, edges and vertices those of their nodes.
 std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells, const SimplexNodes& nodes,
                         const std::array<double, 3>& weights) noexcept {
   std::array<Index, 3> used{};
@@ -37,7 +37,7 @@ Vec3 displacement_of(const Body& body, const NearField& near, const ContactPoint
   return u;
 }
 
-/// Gradients of the barycentric weights that are not zero, along the edge or face that they span.
+/// Gradients of the nonzero barycentric weights, along the edge or face spanned by them.
 std::array<Vec3, 3> slopes(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
   std::array<Vec3, 3> slope{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
   std::array<std::size_t, 3> used{};
@@ -64,7 +64,7 @@ std::array<Vec3, 3> slopes(const SurfaceTree& tree, const SimplexNodes& nodes) n
   return slope;
 }
 
-/// Puts the nodes of a simplex into the near field, at their present places in the tree; `moved`: where the
+/// Adds the nodes of a simplex to the near field, at their present positions in the tree; sets `moved` if the
 /// tree had one elsewhere.
 bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nodes, bool& moved) noexcept {
   bool room = true;
@@ -83,7 +83,7 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
   return room;
 }
 
-/// A node of a simplex that moves and is not in the near field, -1 where there is none.
+/// Returns a movable node of a simplex that is not in the near field; -1 if there is none.
 Index far_node_of(const Body& body, const NearField& near, const SimplexNodes& nodes) noexcept {
   const auto far = std::find_if(nodes.begin(), nodes.end(), [&](Index node) {
     return node >= 0 && body.surface_moves(node) && near.place_of(node) < 0;
@@ -91,7 +91,7 @@ Index far_node_of(const Body& body, const NearField& near, const SimplexNodes& n
   return far == nodes.end() ? -1 : *far;
 }
 
-/// Puts one node into the near field that will be wanted soon, as those that come all at once take long.
+/// Adds one node to the near field that will soon be wanted, as adding many in one tick takes long.
 void want_ahead(const Body& body, SurfaceState& surface, const DetectionScratch& detection) noexcept {
   if (detection.simplex_ahead < 0 || surface.near.count() == surface.near.capacity()) return;
   const Index node = far_node_of(body, surface.near, nodes_of(body, detection.simplex_ahead));
@@ -100,8 +100,8 @@ void want_ahead(const Body& body, SurfaceState& surface, const DetectionScratch&
   surface.tree.refit();
 }
 
-/// The nearest point of a simplex that a sphere touches at its corners alone: where the sphere's middle is
-/// far from it, the nearest corner.
+/// Nearest point of a simplex that a sphere touches at its corners only: the nearest corner if the sphere's
+/// centre is far away.
 NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                               double radius) noexcept {
   const NearestPoint corner = nearest_corner(tree, nodes, core);
@@ -109,8 +109,8 @@ NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes
   return corner.squared_distance > far * far ? corner : nearest_points(tree, nodes, core, true);
 }
 
-/// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
-/// scratch.detection.found and `nearest` of scratch.detection.pairs, and returns how many.
+/// Finds the simplices nearest to the tool in the tree, at most as many as may be examined: fills
+/// scratch.detection.found and `nearest` of scratch.detection.pairs, and returns their number.
 std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scratch& scratch,
                               ToolState& tool, const Core& core, double reach) noexcept {
   const SurfaceTree& tree = surface.tree;
@@ -157,9 +157,9 @@ std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scr
   return count;
 }
 
-/// Whether a candidate from `begin` on is at the same place with the same normal. `vertex`: the surface node
-/// that the place is, -1 where it is none. A node's first candidate is compared with those between nodes
-/// alone: at other nodes there is none like it.
+/// True if a candidate from `begin` on has the same position and normal. `vertex`: surface node at the
+/// position; -1 if there is none. The first candidate of a node is compared only with those between nodes, as
+/// no other can be equal.
 bool is_duplicate(const Body& body, const DetectionScratch& detection, Index begin, const Vec3& position,
                   const Vec3& normal, Index vertex) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
@@ -182,7 +182,7 @@ bool is_duplicate(const Body& body, const DetectionScratch& detection, Index beg
   return false;
 }
 
-/// The surface node that a place is, -1 for one within an edge or face.
+/// Returns the surface node at a position; -1 if it is inside an edge or face.
 Index vertex_of(const SimplexNodes& nodes, const std::array<double, 3>& weights) noexcept {
   for (std::size_t k = 0; k < 3; ++k) {
     if (weights[k] == 1.0) return nodes[k];
@@ -190,8 +190,8 @@ Index vertex_of(const SimplexNodes& nodes, const std::array<double, 3>& weights)
   return -1;
 }
 
-/// Whether a grab of the tool holds a node of a simplex: there the tool does not push as well, as place and
-/// contact would be levers against each other. What is touched then does not hang on how the surface lies.
+/// True if a grab of the tool holds a node of a simplex: the tool does not press there as well, since both
+/// would act as levers against each other. This does not depend on how the surface is deformed.
 bool is_held(const Body& body, const State& state, Index tool, const SimplexNodes& nodes) noexcept {
   const auto begin = state.contact_points.begin();
   return std::any_of(begin, begin + state.held_count, [&](const ContactPoint& held) {
@@ -203,7 +203,7 @@ bool is_held(const Body& body, const State& state, Index tool, const SimplexNode
   });
 }
 
-/// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
+/// True if a contact's normal rotates as the tool moves: at a vertex, and on an edge or face that carried
 /// force.
 bool rolls(const LastContacts& remembered, const Tool& tool, const ContactPoint& contact) noexcept {
   if (!has_point_core(tool) || contact.friction > 0.0) return false;
@@ -252,7 +252,7 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   scratch.detection.candidates[scratch.detection.candidate_count++] = contact;
 }
 
-/// Whether the simplex carried force at the same tool in the tick or pass before.
+/// True if the simplex carried force at the same tool in the last tick or pass.
 bool carried(const LastContacts& remembered, Index tool, const TouchingPair& pair) noexcept {
   const auto begin = remembered.contacts.begin();
   return std::any_of(begin, begin + remembered.count, [&](const ContactPoint& last) {
@@ -260,20 +260,20 @@ bool carried(const LastContacts& remembered, Index tool, const TouchingPair& pai
   });
 }
 
-/// How one tool meets the surface in this tick.
+/// Contact of one tool with the surface in this tick.
 struct ToolContact {
-  Index number;  // of the tool
+  Index number;  // number of the tool
   Core core;
   double margin;          // [m]
-  double lost;            // [m] a core that is deeper than this is lost in the body
+  double lost;            // [m] depth at which a core is lost in the body
   Index usable = 0;       // simplices of scratch.detection.found whose nodes are in the near field
   bool is_known = true;   // scratch.detection.pairs have the nearest points of the core's origin
-  Index first_candidate;  // of this tool
-  double nearest_distance = std::numeric_limits<double>::infinity();  // [m] of the core's origin
+  Index first_candidate;  // first candidate of this tool
+  double nearest_distance = std::numeric_limits<double>::infinity();  // [m] from the core's origin
   bool inside = false;  // the core's origin is behind the surface
 };
 
-/// Keeps those of `count` simplices whose nodes find room in the near field.
+/// Keeps those of `count` simplices whose nodes fit into the near field.
 void keep_usable(const Body& body, State& state, DetectionScratch& detection, ToolContact& touch,
                  std::size_t count) noexcept {
   bool moved = false;
@@ -291,8 +291,8 @@ void keep_usable(const Body& body, State& state, DetectionScratch& detection, To
   touch.is_known = touch.is_known && !moved;
 }
 
-/// The pair of the core's origin. Of a simplex that is touched at its corners alone, normal and height are
-/// left out: few of these are asked for.
+/// Computes the pair of the core's origin. For a simplex touched at its corners only, normal and height are
+/// omitted, since few of these are needed.
 void look_at(const Body& body, const SurfaceTree& tree, const Tool& tool, const ToolContact& touch,
              Index simplex, TouchingPair& pair) noexcept {
   const bool is_chord = touches_corners_alone(body, tool, simplex);
@@ -308,7 +308,7 @@ void look_at(const Body& body, const SurfaceTree& tree, const Tool& tool, const 
   if (!is_chord) find_height(tree, nodes, pair);
 }
 
-/// Fills the pairs of the core's origin, and tells on which side of the nearest simplices it is.
+/// Computes the pairs of the core's origin, and the side of the nearest simplices on which it lies.
 void look_from_origin(const Body& body, const SurfaceTree& tree, const Tool& tool,
                       DetectionScratch& detection, ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
@@ -326,8 +326,8 @@ void look_from_origin(const Body& body, const SurfaceTree& tree, const Tool& too
   touch.inside = side < 0.0;
 }
 
-/// Whether a face looks away from where it looked at rest: what is sharp can fold the surface over itself,
-/// and would be caught between the two sides by friction, whatever it pulls.
+/// True if a face points in the opposite direction from that at rest: a sharp tool can fold the surface over
+/// itself, and would be caught between both sides by friction, at any pulling force.
 bool has_turned_over(const Body& body, const TouchingPair& pair) noexcept {
   const SimplexNodes nodes = nodes_of(body, pair.simplex);
   const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
@@ -336,9 +336,9 @@ bool has_turned_over(const Body& body, const TouchingPair& pair) noexcept {
   return normal.dot(pair.normal) < 0.0;
 }
 
-/// Makes a candidate of a pair that touches or may touch in this tick. From outside, a simplex is touched
-/// from its outer side: those that turn their back are behind others. From a little inside (rounding, or a
-/// fast tick), the nearest ones and those that carried force push out along their normals.
+/// Adds a candidate for a pair that touches or may touch in this tick. From outside, a simplex is touched on
+/// its outer side; those facing away are behind others. From slightly inside (rounding, or a fast tick), the
+/// nearest ones and those that carried force push out along their normals.
 void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                 const TouchingPair& pair) noexcept {
   const double radius = state.tools[touch.number].tool.radius;
@@ -352,7 +352,7 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
   add_candidate(body, state, scratch, touch.number, touch.first_candidate, pair, face_tells);
 }
 
-/// Whether a node has the candidate already that the core's origin makes of it, from another simplex.
+/// True if a node already has the candidate of the core's origin, from another simplex.
 bool is_found(const DetectionScratch& detection, const ToolContact& touch, const SurfaceTree& tree,
               Index node) noexcept {
   const Index k = detection.candidate_at_node[node];
@@ -363,8 +363,9 @@ bool is_found(const DetectionScratch& detection, const ToolContact& touch, const
   return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
 }
 
-/// Contact points of a triangle's edge: where the core is nearest and, under a disc, where it passes over the
-/// rim, as what is nearest of a flat edge is now at the one end of what is under the disc, now at the other.
+/// Adds contact points of a triangle's edge: at the nearest point of the core and, for a disc, at its
+/// crossings with the rim, since the nearest point of a flat edge switches between the ends of its part below
+/// the disc.
 void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                 const TouchingPair& seen, std::size_t corner) noexcept {
   const SurfaceTree& tree = state.surface.tree;
@@ -381,9 +382,9 @@ void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolCont
   }
 }
 
-/// Whether a pair is of a disc's rim and the inside of a face that lies flat under it: what is nearest of the
-/// rim is then now here, now there, and all of it as near. One that was a contact point may be flatter, as
-/// what it does to the surface must not undo it.
+/// True for a pair of a disc's rim and the inside of a face that is flat below it: the nearest point then
+/// switches along the rim, all of which is equally near. A pair that was a contact point may be flatter, so
+/// that its own effect on the surface does not remove it.
 bool is_flat_under_rim(const Body& body, const LastContacts& remembered, const ToolContact& touch,
                        const TouchingPair& pair) noexcept {
   if (touch.core.disc_radius == 0.0 || touch.inside || !is_within_face(pair) || pair.height <= 0.0 ||
@@ -395,8 +396,8 @@ bool is_flat_under_rim(const Body& body, const LastContacts& remembered, const T
          (remembered.number_of(feature) < 0 ? limits.steep : limits.still_steep);
 }
 
-/// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be
-/// none: its arc over the triangle is nearly its chord, whose ends are over the edges.
+/// Adds contact points around a disc's rim inside a face. A disc that is large relative to the triangle needs
+/// none: its arc over the triangle is almost its chord, whose ends are at the edges.
 void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                Index simplex) noexcept {
   if (touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[simplex]) return;
@@ -406,15 +407,15 @@ void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolConta
   }
 }
 
-/// Whether the core's origin makes no candidate of a node: it is out of reach, or has its candidate already.
+/// True if the core's origin adds no candidate at a node: it is out of reach, or has it already.
 bool is_done(const DetectionScratch& detection, const ToolContact& touch, const SurfaceTree& tree,
              double reach, Index node) noexcept {
   return (touch.core.origin - tree.position(node)).squaredNorm() > reach * reach ||
          is_found(detection, touch, tree, node);
 }
 
-/// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
-/// side, now at the other: all corners under it are contact points, and under a segment or disc the edges.
+/// Adds all corners as contact points below a segment, disc or large sphere, and for segment and disc the
+/// edges: relative to a flat surface the single nearest point would switch between sides.
 void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                    const TouchingPair& seen, bool is_extended) noexcept {
   const SurfaceTree& tree = state.surface.tree;
@@ -431,9 +432,10 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
   }
 }
 
-/// Contact points of a sphere with a simplex that it touches at its corners alone. Between its nodes the
-/// surface is smooth: its triangles are chords of a sphere that is large against them, and would hold it out
-/// by edge^2 / 6 R. From outside and not deep, most simplices have no corner left that others had not.
+/// Adds the contact points of a sphere with a simplex that it touches at its corners only. Between the nodes
+/// the surface is smooth: its triangles are chords that are small relative to the sphere, and would keep it
+/// out by edge^2 / 6 R. From outside and not deep, most simplices have no corner left that others have not
+/// added.
 void touch_chord(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                  const TouchingPair& nearest) noexcept {
   const SurfaceTree& tree = state.surface.tree;
@@ -450,7 +452,7 @@ void touch_chord(const Body& body, State& state, Scratch& scratch, const ToolCon
   touch_corners(body, state, scratch, touch, pair, false);
 }
 
-/// Contact points of one tool with one simplex.
+/// Adds the contact points of one tool with one simplex.
 void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                    const TouchingPair& nearest) noexcept {
   const Tool& tool = state.tools[touch.number].tool;
@@ -460,7 +462,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   TouchingPair pair = nearest;
   const bool is_disc = touch.core.disc_radius > 0.0;
   const bool is_extended = !has_point_core(tool);
-  // The middle of a disc is no more in the way than what is around it, unless it has to be pushed out.
+  // The centre of a disc is no special point, except when it has to be pushed out.
   if (!is_disc || touch.inside) touch_pair(body, state, scratch, touch, pair);
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
@@ -473,7 +475,8 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   if (is_disc) touch_rim(body, state, scratch, touch, simplex);
 }
 
-/// How much of what the surface moved in the tick before it is to move in this one: as the device does.
+/// Fraction of the surface's motion in the last tick that is expected in this one, from the motion of the
+/// device.
 double going_on(const ToolState& tool) noexcept {
   const double squared = tool.last_motion.squaredNorm();
   if (squared == 0.0) return 0.0;
@@ -481,7 +484,7 @@ double going_on(const ToolState& tool) noexcept {
   return std::clamp(motion.dot(tool.last_motion) / squared, 0.0, 1.0);
 }
 
-/// How far the surface moved at a contact point in the tick before [m].
+/// Motion of the surface at a contact point in the last tick [m].
 Vec3 last_motion(const Body& body, const NearField& near, const ContactPoint& contact) noexcept {
   Vec3 motion = Vec3::Zero();
   for (std::size_t k = 0; k < 3; ++k) {
@@ -491,8 +494,8 @@ Vec3 last_motion(const Body& body, const NearField& near, const ContactPoint& co
   return motion;
 }
 
-/// How far the core's point over a contact point goes with the device in this tick [m]: not along the core of
-/// a capsule, which is the same there.
+/// Motion with the device in this tick of the core's point above a contact point [m], without that along the
+/// axis of a capsule, which has no effect.
 Vec3 core_motion(const ToolState& tool, const Core& core, const ContactPoint& contact) noexcept {
   if (tool.tool.length == 0.0) return tool.device.position - tool.last_device.position;
   const Vec3 arm = contact.arm + (contact.gap + tool.tool.radius) * contact.frame.col(0);
@@ -504,15 +507,15 @@ Vec3 core_motion(const ToolState& tool, const Core& core, const ContactPoint& co
                                           : motion;
 }
 
-/// Whether a tool is so blunt that the normal at a node turns little as it passes over it. Over a disc's flat
-/// side it does not turn at all.
+/// True if a tool is so blunt that the normal at a node rotates little as it passes over it. Over the flat
+/// side of a disc it does not rotate at all.
 bool is_blunt(const Body& body, const Tool& tool) noexcept {
   return tool.disc_radius <= tool.radius &&
          tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
 }
 
-/// Turns the normals of contacts ahead by what the device moves in the tick. Not before all are found: the
-/// same place is known by the normal that it has now.
+/// Rotates the normals of contacts in advance, by the device's motion in the tick. This is done after all are
+/// found, since equal positions are recognised by their present normals.
 void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, const Core& core,
                 DetectionScratch& detection, Index begin) noexcept {
   if (tool.device.position == tool.last_device.position &&
@@ -534,13 +537,13 @@ void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, 
   }
 }
 
-/// Whether the core is so deep in the body that no simplex would push it out on the side that it came from.
+/// True if the core is so deep in the body that no simplex would push it out on the side where it entered.
 bool is_lost(const Body& body, const SurfaceTree& tree, const ToolContact& touch) noexcept {
   if (touch.usable > 0) return touch.inside && touch.nearest_distance > touch.lost;
   return body.bounds().contains(touch.core.origin) && tree.inside(touch.core.origin);
 }
 
-/// Contact points of one tool.
+/// Finds the contact points of one tool.
 void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[number];
   ToolContact touch{.number = number,
@@ -570,7 +573,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     turn_ahead(body, state.surface.near, tool, touch.core, scratch.detection, touch.first_candidate);
 }
 
-/// Puts the nodes that a held contact moves with into the near field; whether they find room.
+/// Adds the nodes of a held contact to the near field; false if they do not fit.
 bool want_held(const Body& body, SurfaceState& surface, const ContactPoint& held) noexcept {
   bool moved = false;
   bool room = true;
@@ -580,7 +583,7 @@ bool want_held(const Body& body, SurfaceState& surface, const ContactPoint& held
   return room && (held.aggregate < 0 || surface.near.want(body, body.aggregate_node(held.aggregate)));
 }
 
-/// Where held contacts are now. Those whose nodes find no room are let go.
+/// Updates the held contacts' positions. Those whose nodes do not fit are released.
 void update_held(const Body& body, State& state) noexcept {
   Index kept = 0;
   for (Index k = 0; k < state.held_count; ++k) {

@@ -1,4 +1,4 @@
-// Finds where the tools can touch the deformed surface.
+// Detection of contact points between the tools and the deformed surface.
 #pragma once
 
 #include "runtime/tick/state.h"
@@ -6,11 +6,11 @@
 namespace palpate {
 
 /// Fills state.contact_points: held ones first, then for each engaged tool the nearest points of the surface
-/// within the tool's margin, of each triangle (line) and core end one, of a segment, disc and large sphere
-/// also those of corners, of a segment and a disc those of edges and of a disc those of its rim, without
-/// duplicates; merged where they are many (contact_merging.h), and the deepest where there are more than
-/// max_contacts all the same. A sphere of over three edges in radius touches corners alone. Nodes of all
-/// contacts are in state.surface.near.
+/// within the tool's margin, one per triangle (line) and core end; for a segment, disc and large sphere also
+/// corners, for a segment and disc also edges, for a disc also points of its rim; without duplicates. Many
+/// are merged (contact_merging.h), and if there are still more than max_contacts, the deepest are kept. A
+/// sphere with a radius of over three edges touches corners only. The nodes of all contacts are in
+/// state.surface.near.
 void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept;
 
 }  // namespace palpate

@@ -24,12 +24,12 @@ std::int64_t feature_of_vertex(std::int64_t of_group, Index node) noexcept {
   return with_kind(of_group, FeatureKind::vertex, node);
 }
 
-/// A feature that no contact point has; held ones count from -1 down.
+/// Returns a feature that no contact point has; those of held contacts count down from -1.
 std::int64_t feature_of_nobody(Index number) noexcept {
   return std::numeric_limits<std::int64_t>::min() + number;
 }
 
-/// The surface node that a contact point is at, -1 where it is at none or at several.
+/// Surface node of a contact point; -1 if it is at none or at several.
 Index vertex_of(const ContactPoint& contact) noexcept {
   if (contact.aggregate >= 0) return none;
   Index vertex = none;
@@ -41,7 +41,7 @@ Index vertex_of(const ContactPoint& contact) noexcept {
   return vertex;
 }
 
-/// How much of the friction that a contact can bear it bore.
+/// Fraction of the available friction used by a contact.
 double share_of_friction(const ContactPoint& contact) noexcept {
   if (contact.friction == 0.0) return 0.0;
   const Vec3 n = contact.frame.col(0);
@@ -61,7 +61,7 @@ class Merging {
 
   [[nodiscard]] bool is_wanted() const noexcept {
     if (state_.surface.patch != nullptr || state_.surface.near.patch() != nullptr) return false;
-    Index pressed = 0;  // nodes, in the tick before
+    Index pressed = 0;  // nodes in the last tick
     bool has_merged = false;
     for (Index k = 0; k < scratch_.last.count; ++k) {
       const ContactPoint& last = scratch_.last.contacts[k];
@@ -100,14 +100,14 @@ class Merging {
     }
   }
 
-  /// The one candidate at a node, null where there is none or there are several.
+  /// Returns the only candidate at a node; null if there is none or there are several.
   [[nodiscard]] ContactPoint* candidate_at(Index node) const noexcept {
     const Index k = scratch_.merging.candidate_of_node[node];
     return k < 0 ? nullptr : &scratch_.detection.candidates[k];
   }
 
-  /// Those groups of the tick before that are still pressed by all their nodes, and how far these have come
-  /// apart since.
+  /// Finds the groups of the last tick that are still pressed by all their nodes, and the deviation of the
+  /// nodes' gaps.
   void look_at_merged() noexcept {
     for (Index k = 0; k < scratch_.last.count; ++k) {
       const ContactPoint& last = scratch_.last.contacts[k];
@@ -129,13 +129,13 @@ class Merging {
     }
   }
 
-  /// Some nodes of a group slip sooner than others, which it does not know.
+  /// True if some nodes of a group may slip before others, which the group cannot represent.
   [[nodiscard]] bool may_begin_to_slip(const ContactPoint& group) const noexcept {
     const double share = share_of_friction(group);
     return !is_crowded_ && share > tuning.merging.no_longer_sticking && !slips(share);
   }
 
-  /// Merges them again, but those that have become wrong most, as long as all contact points have room.
+  /// Merges these groups again, except those with the largest defects, as long as all contact points fit.
   void merge_again() noexcept {
     const auto begin = scratch_.merging.merged.begin();
     std::sort(begin, begin + merged_count_, [](const MergedGroup& a, const MergedGroup& b) {
@@ -167,9 +167,9 @@ class Merging {
     }
   }
 
-  /// What the nodes of a group have of the force that they carried, of those that stick as the first of them
-  /// does, or slip as it does, unless there is a crowd. False where they are too few, or the group was looked
-  /// at by another of its nodes.
+  /// Computes the weights of a group's nodes from the forces that they carried, for those that stick (or
+  /// slip) as the first of them does; for all in a crowd. False if there are too few, or the group was
+  /// examined from another of its nodes.
   [[nodiscard]] bool find_weights(Index group, const ContactPoint& candidate) noexcept {
     const std::span<const Index> members = body_.aggregates().members(group);
     std::vector<double>& weights = scratch_.merging.weights;
@@ -194,8 +194,8 @@ class Merging {
     return true;
   }
 
-  /// Turns the group's force at each node as the normal there is turned against the mean one, whose sum it is
-  /// then. False where they differ too much.
+  /// Computes maps that rotate the group's force at each node from the mean normal to the node's own,
+  /// preserving the sum. False if the normals differ too much.
   [[nodiscard]] bool find_maps(Index group) noexcept {
     const std::span<const Index> members = body_.aggregates().members(group);
     const std::vector<double>& weights = scratch_.merging.weights;
@@ -214,8 +214,8 @@ class Merging {
     return true;
   }
 
-  /// The contact point of a node in the tick before; null where it carried no force or is not one of the
-  /// candidate's kind.
+  /// Returns the contact point of a node in the last tick; null if it carried no force or is of another kind
+  /// than the candidate.
   [[nodiscard]] const ContactPoint* last_at(Index node, const ContactPoint& candidate) const noexcept {
     const ContactPoint* at = candidate_at(node);
     if (at == nullptr || at->friction != candidate.friction || !are_alike(at->feature, candidate.feature))
@@ -226,7 +226,7 @@ class Merging {
     return last.force.dot(last.frame.col(0)) > 0.0 ? &last : nullptr;
   }
 
-  /// Puts the mean of a group's candidates in the place of the first.
+  /// Replaces the first of a group's candidates by their mean.
   void merge(Index group) noexcept {
     ContactPoint merged;
     ContactPoint* first = nullptr;
@@ -265,11 +265,11 @@ class Merging {
   Scratch& scratch_;
   Index room_;
   Index left_ = 0;           // contact points
-  bool is_crowded_ = false;  // nodes that stick and nodes that slip are merged, too
+  bool is_crowded_ = false;  // sticking and slipping nodes are merged alike
   Index merged_count_ = 0;
 };
 
-/// Shares a group's force out among its nodes. Where there is no room for all, some begin without.
+/// Distributes a group's force over its nodes. Nodes that do not fit start without force.
 void part_last(const Body& body, const NearField& near, Scratch& scratch, Index number) noexcept {
   const ContactPoint group = scratch.last.contacts[number];
   const Eigen::Matrix3d response = scratch.assembly.response[number];
@@ -292,7 +292,7 @@ void part_last(const Body& body, const NearField& near, Scratch& scratch, Index 
   });
 }
 
-/// Adds the forces of a group's nodes up, at the place of the first of them. Whether there was one.
+/// Adds up the forces of a group's nodes, at the place of the first of them. False if there is none.
 bool merge_last(const Body& body, const NearField& near, Scratch& scratch,
                 const ContactPoint& group) noexcept {
   Index first = none;

@@ -22,7 +22,7 @@ bool is_finite(const ContactProblem& problem) noexcept {
                      [](double value) { return std::abs(value) < max_plausible_force; });
 }
 
-/// Makes only a share of the last change of forces.
+/// Scales the last change of forces by `share`.
 void retreat(State& state, double share) noexcept {
   state.surface.near.retreat(share);
   state.surface.near.displace();
@@ -33,10 +33,10 @@ void retreat(State& state, double share) noexcept {
   }
 }
 
-/// A point that slides over the edge of a fold throws the surface from one side of it to the other, and back
-/// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
-/// can be trusted, only a share of their change is made. A body that is let go does not leap: it stays where
-/// it is and swings from there.
+/// A point that slides over the edge of a fold throws the surface from one side to the other, and back in the
+/// next tick. If forces would move the near surface farther than a Newton step can be trusted, their change
+/// is scaled down. Not for a released body, which does not leap: it keeps its position and vibrates from
+/// there.
 void retreat_from_leaps(const Body& body, State& state) noexcept {
   if (state.surface.near.load().count == 0 || is_released(body, state)) return;
   double farthest = 0.0;
@@ -51,9 +51,9 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
   if (farthest > most) retreat(state, most / farthest);
 }
 
-/// A contact whose point moves from a face over its edge may be thrown back and forth by Newton's method,
-/// which follows one of them at a time. While nothing else moves, it goes half the way when it turns back.
-/// Not where other contacts find room than in the tick before: half way there belongs to neither.
+/// Newton's method may move a contact back and forth between a face and the face beyond its edge, as it
+/// follows one at a time. While nothing else moves, its change is halved when it reverses. Not if contacts
+/// are left out: the state half way would belong to neither set.
 void halve_return(const Body& body, State& state, const DetectionScratch& detection) noexcept {
   const bool returns = state.still_ticks > 1 && detection.left_out_count == 0 && !is_released(body, state) &&
                        std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
@@ -63,7 +63,7 @@ void halve_return(const Body& body, State& state, const DetectionScratch& detect
   if (returns) retreat(state, 0.5);
 }
 
-/// Deepest penetration at the contact points, as the tick before or the pass before left it [m].
+/// Largest penetration at the contact points after the last tick or pass [m].
 double penetration(const State& state) noexcept {
   double deepest = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
@@ -72,8 +72,8 @@ double penetration(const State& state) noexcept {
   return deepest;
 }
 
-/// Whether the contact points have come to lie so deep that another pass is wanted. Where some are merged,
-/// the gaps of those that part are right to what merging neglects, and no pass makes them better.
+/// True if contact points are so deep that another pass is needed. If some are merged, the gaps of those
+/// being split are accurate up to the error of merging, and no pass improves them.
 bool is_rough(const Body& body, const State& state) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
   const bool some_merged = std::any_of(contacts.begin(), contacts.end(), is_group);
@@ -81,7 +81,7 @@ bool is_rough(const Body& body, const State& state) noexcept {
   return penetration(state) > most * body.mean_surface_edge();
 }
 
-/// Whether another pass would be quick, and is not past a release, from which the body swings.
+/// True if another pass would be fast, and the body is not released, after which it vibrates.
 bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
   const bool was_easy =
@@ -90,7 +90,7 @@ bool may_repeat(const Body& body, const State& state, const Scratch& scratch) no
   return was_easy && !scratch.solvers.was_improved && !is_released(body, state);
 }
 
-/// Takes up the patch that is wanted. Where there is no room for it the old one stays.
+/// Switches to the requested patch. The old one is kept if the capacity is exceeded.
 void change_patch(const Body& body, State& state) noexcept {
   if (state.surface.patch == state.surface.near.patch() ||
       state.surface.near.change_patch(body, state.surface.patch))
@@ -99,7 +99,7 @@ void change_patch(const Body& body, State& state) noexcept {
   state.status |= StepStatus::capacity_full;
 }
 
-/// Whether an iterative solver has changed no force of the tick before by more than what is nothing.
+/// True if an iterative solver changed no force of the last tick significantly.
 bool changes_nothing(const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
   if ((problem.frictionless && !problem.many) || scratch.merging.has_changed) return false;
@@ -115,10 +115,10 @@ bool changes_nothing(const Scratch& scratch) noexcept {
     if (std::abs(problem.lambda[i] - problem.guess[i]) > most) return false;
     all -= problem.guess[i] * problem.guess[i];
   }
-  return all <= most * std::sqrt(largest);  // no contact that had a force has gone
+  return all <= most * std::sqrt(largest);  // no contact with a force has vanished
 }
 
-/// Contacts that press on what the body does not give way at.
+/// Reports contacts that press on a rigid part of the body.
 void tell_rigid_contacts(State& state) noexcept {
   for (const ContactPoint& contact : state.contacts()) {
     if (contact.rigid && !contact.force.isZero(0.0))
@@ -126,13 +126,13 @@ void tell_rigid_contacts(State& state) noexcept {
   }
 }
 
-/// Back to the contacts that were solved for.
+/// Restores the contacts for which the problem was solved.
 void recall_contacts(State& state, const LastContacts& remembered) noexcept {
   std::copy_n(remembered.contacts.begin(), remembered.count, state.contact_points.begin());
   state.contact_count = remembered.count;
 }
 
-/// One step of Newton's method about where everything is now.
+/// Performs one Newton step at the present positions.
 ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   assemble_contact(body, state, scratch);
   std::copy_n(scratch.problem.lambda.begin(), scratch.problem.rows, scratch.problem.guess.begin());
@@ -156,7 +156,7 @@ ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noex
   return ContactOutcome::solved;
 }
 
-/// What a contact that sticks slid all the same, as the solver is not exact.
+/// Slip of a sticking contact due to the solver's tolerance.
 Vec3 carried_slip(const Scratch& scratch, Index k) noexcept {
   const ContactProblem& problem = scratch.problem;
   if (problem.held[k] != 0 || problem.rows_of(k) < 2) return Vec3::Zero();
@@ -182,7 +182,7 @@ void give_contact_force(const Scratch& scratch, Index number, ContactPoint& cont
   contact.carry = scratch.problem.many ? carried_slip(scratch, number) : Vec3(Vec3::Zero());
 }
 
-/// Turns the forces of contacts that roll as their faces and edges tilt.
+/// Rotates the forces of rolling contacts as their faces and edges tilt.
 void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
   for (Index k = state.contact_count; k < problem.contacts; ++k) {
@@ -200,7 +200,7 @@ bool solve_problem(Scratch& scratch) noexcept {
   if (scratch.problem.many) return scratch.solvers.newton_krylov.solve(scratch.problem);
   if (scratch.problem.frictionless) return scratch.solvers.active_set.solve(scratch.problem);
   if (scratch.solvers.cone_solver.solve(scratch.problem)) return true;
-  // Newton's steps run in circles on nearly singular W where sweeps go on. From there they settle the rest.
+  // On a nearly singular W Newton steps cycle where sweeps converge. From there Newton steps can finish.
   scratch.solvers.was_improved = true;
   scratch.solvers.newton_krylov.improve_few(scratch.problem);
   return scratch.solvers.cone_solver.solve(scratch.problem);

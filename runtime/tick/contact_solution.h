@@ -1,4 +1,4 @@
-// Contact in one tick: the contact problem about where everything is, solved by Newton passes.
+// Contact in one tick: the contact problem at the present positions, solved by Newton passes.
 #pragma once
 
 #include <cstdint>
@@ -7,28 +7,27 @@
 
 namespace palpate {
 
-/// Fills scratch.problem.lambda for the rows of scratch.problem: the active set where nothing rubs, otherwise
-/// the cone solver. False where it did not reach its tolerance.
+/// Computes scratch.problem.lambda for the rows of scratch.problem: with the active set if there is no
+/// friction, otherwise with the cone solver. False if it did not reach its tolerance.
 bool solve_problem(Scratch& scratch) noexcept;
 
-/// Changes of lambda by changes of b: the first `changes` that scratch.changes.of_rows has, one after the
-/// other, into scratch.changes.of_forces, which holds a guess before where contacts are many. After
+/// Computes changes of lambda for changes of b: the first `changes` ones in scratch.changes.of_rows,
+/// concatenated, into scratch.changes.of_forces, which for many contacts holds a guess before. Call after
 /// solve_problem.
 void find_force_changes(Scratch& scratch, int changes) noexcept;
 
-/// Gives scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.
+/// Passes scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.
 void apply_forces(State& state, const Scratch& scratch) noexcept;
 
-/// What the contact of a tick came to.
+/// Result of contact in a tick.
 enum class ContactOutcome : std::uint8_t {
   solved,
-  unchanged,   ///< nothing has moved, and all contact points, forces and places are those of the tick before
-  not_finite,  ///< StepStatus::result_not_finite: everything but the contact points stays as it was
+  unchanged,   ///< nothing has moved: contact points, forces and positions equal those of the last tick
+  not_finite,  ///< StepStatus::result_not_finite: everything except the contact points is unchanged
 };
 
-/// Finds the contact points and their forces, and moves tools and near surface to where these take them. A
-/// pass is a step of Newton's method: one is enough except for contact that slips far in a tick. Takes up the
-/// patch that is wanted.
+/// Finds the contact points and their forces, and moves tools and near surface accordingly. A pass is a
+/// Newton step: one is enough unless contact slips far in a tick. Switches to the requested patch.
 ContactOutcome solve_contact(const Body& body, State& state, Scratch& scratch) noexcept;
 
 }  // namespace palpate

@@ -21,13 +21,13 @@ void leave_out(const Body& body, const State& state, DetectionScratch& detection
   detection.left_out[detection.left_out_count++] = place;
 }
 
-/// How deep the tool has come to be there [m].
+/// Present depth of the tool there [m].
 double depth_now(const State& state, const LeftOut& place) noexcept {
   const Vec3 apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);
   return -(place.gap + place.normal.dot(apart - place.apart));
 }
 
-/// The stored node that a surface node follows most.
+/// Stored node with the largest weight for a surface node.
 Index stored_node(const Body& body, Index node) noexcept {
   const SurfaceParts parts = body.surface_parts(node);
   const auto most = std::max_element(parts.weights.begin(), parts.weights.end()) - parts.weights.begin();
@@ -43,7 +43,7 @@ double along(const Vec3& n, std::span<const double> block, std::ptrdiff_t stride
   return sum;
 }
 
-/// The force that closes a place alone [N].
+/// Force that closes a place alone [N].
 double closing_force(const Body& body, const State& state, const LeftOut& place, double depth) noexcept {
   const Index node = stored_node(body, place.node);
   std::array<double, 9> block{};
@@ -54,13 +54,13 @@ double closing_force(const Body& body, const State& state, const LeftOut& place,
   return depth / std::max(give, state.surface.least_compliance);
 }
 
-/// Places that a tool presses on.
+/// Places pressed by a tool.
 struct Pressed {
   double contact_points = 0.0;
   std::size_t places = 0;
 };
 
-/// Those that are deeper than what a tick leaves at contacts, too.
+/// Visits these places if they are deeper than the penetration tolerated at contacts.
 template <class Visit>
 void for_each_pressed(const State& state, const DetectionScratch& detection, Index tool, double edge,
                       Visit&& visit) noexcept {
@@ -83,7 +83,7 @@ Pressed count_pressed(const State& state, const DetectionScratch& detection, Ind
   return pressed;
 }
 
-/// What the places that were left out would add to a tool's force [N].
+/// Additional force on a tool by the places left out [N].
 double missing_of_left_out(const Body& body, const State& state, Scratch& scratch, Index tool,
                            std::size_t places) noexcept {
   const std::size_t stride = (places + most_sampled - 1) / most_sampled;
@@ -127,9 +127,9 @@ double missing_of_left_out(const Body& body, const State& state, Scratch& scratc
   return given_way > depth_there ? depth_there / given_way * sum.norm() : sum.norm();
 }
 
-/// By what a step of Newton's method would change the force. The solver of few contacts is cut short where
-/// such steps run in circles: there they are much too long, the residual says much too little, and the truth
-/// lies between (docs/decisions).
+/// Error from the change of the force by a Newton step. The solver for few contacts stops early where such
+/// steps cycle: there they are much too long, the residual is much too small, and the true error lies between
+/// (docs/decisions).
 double error_of_solver(const Scratch& scratch, double step) noexcept {
   if (scratch.solvers.is_solved) return 0.0;
   return scratch.problem.many ? tuning.hand.error_margin * step

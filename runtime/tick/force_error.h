@@ -1,4 +1,4 @@
-// How far the contact force of a tick may be from the one that was asked for.
+// Estimated error of a tick's contact forces.
 #pragma once
 
 #include "runtime/tick/state.h"
@@ -6,26 +6,25 @@
 
 namespace palpate {
 
-/// Notes a simplex of scratch.detection.found that found no room, as far as the tool reaches into it.
+/// Records a simplex of scratch.detection.found that exceeds the capacity, if the tool reaches into it.
 void leave_out_simplex(const Body& body, const State& state, DetectionScratch& detection, Index tool,
                        const Core& core, Index simplex) noexcept;
 
-/// Notes a contact point that found no room.
+/// Records a contact point that exceeds the capacity.
 void leave_out_contact(const Body& body, const State& state, DetectionScratch& detection,
                        const ContactPoint& contact) noexcept;
 
-/// Before the local models of a tick are made: fills scratch.force_error.missing_force [tools] with what the
-/// forces of a problem that was not solved change by at once, in one more step of Newton's method.
+/// Computes scratch.force_error.missing_force [tools], the immediate change of the forces of an unsolved
+/// problem by one more Newton step. Call before the local models of a tick are made.
 void begin_force_error(Scratch& scratch) noexcept;
 
-/// Takes in how the forces answer to a motion of the tool along an axis (scratch.changes.of_forces from
-/// `begin` on): what the tool lacks along that axis.
+/// Adds the error of the force along an axis, from the response of the forces to a motion of the tool along
+/// it (scratch.changes.of_forces from `begin` on).
 void note_answer(Scratch& scratch, Index tool, int axis, Index begin) noexcept;
 
-/// Fills force_error and left_out of the tools, once surface and tools are where the forces have them. Of
-/// what found no room those places count that the tool has come to press on. The forces that would close each
-/// alone are scaled so that together they just close the deepest: mostly somewhat more than what is missing,
-/// as the contacts that are there would be relieved.
+/// Computes force_error and left_out of the tools, once surface and tools have moved. Places left out count
+/// if the tool presses on them. The forces that would close each alone are scaled so that together they just
+/// close the deepest: mostly an overestimate, as the present contacts would be relieved.
 void find_force_errors(const Body& body, State& state, Scratch& scratch) noexcept;
 
 }  // namespace palpate

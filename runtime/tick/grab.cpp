@@ -7,8 +7,8 @@
 namespace palpate {
 namespace {
 
-/// Where a place of the surface was at the end of the last tick, as the tool's pose was. (A contact point's
-/// own position is that of its beginning.)
+/// Position of a surface point at the end of the last tick, consistent with the tool's pose. (A contact
+/// point's own position is that at the beginning.)
 Vec3 last_place(const Body& body, const SurfaceState& surface, const ContactPoint& contact) noexcept {
   Vec3 place = Vec3::Zero();
   for_each_node(body, surface.near, contact, [&](Index node, double weight) {
@@ -30,7 +30,7 @@ void hold_contact(const Body& body, State& state, const ContactPoint& contact) n
   state.contact_points[state.held_count++] = held;
 }
 
-/// The nearest place of the surface within reach, as a contact.
+/// Holds the nearest point of the surface within reach, as a contact.
 bool reach_out(const Body& body, State& state, Index number) noexcept {
   ToolState& tool = state.tools[number];
   const NearestSimplex found = state.surface.tree.nearest(tool.pose.position);
@@ -52,7 +52,7 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
   return true;
 }
 
-/// Grab: what is closed is held; if nothing is, the surface within reach.
+/// Starts a grab: closed contacts are held; if there are none, the surface within reach.
 void begin_hold(const Body& body, State& state, const LastContacts& remembered, Index number) noexcept {
   ToolState& tool = state.tools[number];
   const Index before = state.held_count;

@@ -1,4 +1,4 @@
-// How far off forces may be by what compressed Green's functions lack.
+// Bound on the error of forces due to compressed Green's functions.
 #pragma once
 
 #include <optional>
@@ -14,20 +14,20 @@ class Body;
 class NearField;
 struct ContactRow;
 
-/// Workspace of it.
+/// Workspace of the bound.
 struct GreensErrorScratch {
   GreensErrorScratch(const Body& body, const NearField& near);
 
-  std::optional<ErrorBound> bound;  ///< none where the Green's functions are not compressed
-  std::vector<double> near_force;   ///< [d near nodes] what a motion of the tool adds [N/m]
+  std::optional<ErrorBound> bound;  ///< empty if the Green's functions are not compressed
+  std::vector<double> near_force;   ///< [d near nodes] change by a motion of the tool [N/m]
   NodalLoad stored_force;           ///< the same on stored nodes
 };
 
-/// Takes the forces that a tick has found.
+/// Stores the forces of a tick.
 void begin_greens_error(const NearField& near, GreensErrorScratch& work) noexcept;
 
-/// The most that the force on a tool may be off by along an axis [N]: `force_change` [rows] is by how much
-/// the forces of `rows` answer to a motion of the tool along it [N/m].
+/// Returns a bound on the error of the force on a tool along an axis [N]. `force_change` [rows]: change of
+/// the forces of `rows` by a motion of the tool along it [N/m].
 [[nodiscard]] double greens_error(NearField& near, GreensErrorScratch& work, std::span<const ContactRow> rows,
                                   std::span<const double> force_change) noexcept;
 

@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-/// As much of the way from one vector to another as is no longer than `most`.
+/// Fraction of the distance between two vectors that is no longer than `most`.
 double share_of_way(const Vec3& from, const Vec3& to, double most) noexcept {
   const double way = (to - from).norm();
   return way > most ? most / way : 1.0;
@@ -30,7 +30,7 @@ void hand_over(ToolState& tool, double tick) noexcept {
   const double arm = std::max(extent(tool.tool), tool.tool.reach);
   const double torque = tool.contacts > 0 ? share_of_way(last.torque, contact.torque,
                                                          tool.explained.torque.norm() + arm * handed_over)
-                                          : force;  // what is lost fades as one
+                                          : force;  // a lost force and its torque fade together
   tool.wrench = contact;
   if (force < 1.0) tool.wrench.force = last.force + force * (contact.force - last.force);
   if (torque < 1.0) tool.wrench.torque = last.torque + torque * (contact.torque - last.torque);

@@ -16,7 +16,8 @@
 namespace palpate {
 namespace {
 
-/// Symmetric part, without what would push the hand on: sliding friction makes the true one unsymmetric.
+/// Positive semidefinite part of the symmetric part: sliding friction makes the true stiffness unsymmetric,
+/// and negative stiffness would drive the hand.
 Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
   const Eigen::Matrix3d symmetric = 0.5 * (stiffness + stiffness.transpose());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
@@ -26,8 +27,8 @@ Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
   return vectors * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * vectors.transpose();
 }
 
-/// Motions along the rows when the device moves by `motion`, and is turned by `turn` about its origin:
-/// [rows] of scratch.changes.of_rows from `begin` on.
+/// Computes the motions along the rows for a displacement `motion` of the device and a rotation `turn` about
+/// its origin: [rows] of scratch.changes.of_rows from `begin` on.
 void fill_row_change(const State& state, Scratch& scratch, Index number, const Vec3& motion, const Vec3& turn,
                      Index begin = 0) noexcept {
   const ContactProblem& problem = scratch.problem;
@@ -44,7 +45,7 @@ void fill_row_change(const State& state, Scratch& scratch, Index number, const V
         scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
 }
 
-/// How far a free tool may move before it touches: what its nearest contact point leaves.
+/// Sets the radius of a free tool: the gap of its nearest contact point.
 void linearise_free(const State& state, ToolState& tool, Index number) noexcept {
   for (const ContactPoint& contact : state.contacts()) {
     if (contact.tool == number)
@@ -52,7 +53,7 @@ void linearise_free(const State& state, ToolState& tool, Index number) noexcept 
   }
 }
 
-/// Change of the tool's wrench by the change of forces that begins at `begin` of scratch.changes.of_forces.
+/// Change of the tool's wrench by the change of forces starting at `begin` in scratch.changes.of_forces.
 Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   Wrench change;
@@ -73,8 +74,8 @@ Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index
   return change;
 }
 
-/// Contacts that would open by the change of forces at a motion of 1, which begins at `begin`, bound the
-/// radius.
+/// Bounds the radius by the contacts that would open, from the change of forces per unit of motion starting
+/// at `begin`.
 void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   const std::span<const double> change =
@@ -87,7 +88,7 @@ void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState&
   }
 }
 
-/// Open contact points of the tool bound the radius by their gaps.
+/// Bounds the radius by the gaps of the tool's open contact points.
 void keep_open_contacts(const State& state, const ContactProblem& problem, ToolState& tool,
                         Index number) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
@@ -97,7 +98,7 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
   }
 }
 
-/// Begins changes of forces by motions of the device with those of the tick before, where contacts are many.
+/// Initialises changes of forces with those of the last tick, for many contacts.
 void guess_force_changes(const State& state, Scratch& scratch, Index number) noexcept {
   const ContactProblem& problem = scratch.problem;
   if (!problem.many) return;
@@ -128,8 +129,7 @@ void keep_force_changes(const State& state, Scratch& scratch, Index number) noex
   }
 }
 
-/// What the turn of the device in this tick changes of the tool's wrench. Places that are held turn with the
-/// tool.
+/// Change of the tool's wrench by the rotation of the device in this tick. Held points rotate with the tool.
 Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& tool, Index number) noexcept {
   if (tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs()) return {};
   const Eigen::AngleAxisd turned(tool.device.orientation * tool.last_device.orientation.conjugate());

@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-/// What turns and what follows of the closed contacts and their tilt.
+/// Collects the closed contacts with rotating normals, and the closed rows including tilt.
 void gather_contacts(const State& state, Scratch& scratch, Index number, double radius) noexcept {
   const ContactProblem& problem = scratch.problem;
   RollingScratch& rolling = scratch.changes.rolling;
@@ -28,7 +28,7 @@ void gather_contacts(const State& state, Scratch& scratch, Index number, double 
   }
 }
 
-/// What the near nodes move by a force along an axis at a turning contact.
+/// Displacement of the near nodes by a force along an axis at a contact with a rotating normal.
 template <int D>
 const double* response(const NearField& near, Scratch& scratch, const RollingScratch::Turning& turning,
                        int axis) noexcept {
@@ -45,7 +45,7 @@ const double* response(const NearField& near, Scratch& scratch, const RollingScr
   return y;
 }
 
-/// Fills T and B.
+/// Computes T and B.
 template <int D>
 void gather_response(const NearField& near, Scratch& scratch) noexcept {
   RollingScratch& rolling = scratch.changes.rolling;
@@ -90,7 +90,8 @@ Lanes squared(const VectorLanes& vectors) noexcept {
   return vectors[0].square() + vectors[1].square() + vectors[2].square();
 }
 
-/// The device's motion along each axis, and what the tool gives way to a change of force.
+/// Motion of the tool for a unit motion of the device along each axis: that motion plus the coupling's
+/// response to the change of force.
 VectorLanes tool_motion(const VectorLanes& change, double coupling) noexcept {
   VectorLanes motion;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -100,7 +101,8 @@ VectorLanes tool_motion(const VectorLanes& change, double coupling) noexcept {
   return motion;
 }
 
-/// What a turning contact moves against the tool, which moves by `tool`, by the changes of force so far.
+/// Motion of the surface relative to the tool at a contact with a rotating normal, by the changes of force so
+/// far; `tool` is the tool's motion.
 template <int D>
 VectorLanes relative_motion(const RollingScratch& rolling, Index contact, const VectorLanes& tool) noexcept {
   VectorLanes motion = tool;
@@ -117,7 +119,7 @@ VectorLanes relative_motion(const RollingScratch& rolling, Index contact, const 
   return motion;
 }
 
-/// The forces by which normals turn; their sum on the tool.
+/// Computes the forces by which normals rotate; returns their sum on the tool.
 template <int D>
 VectorLanes turn_normals(RollingScratch& rolling, const VectorLanes& tool) noexcept {
   VectorLanes sum = zero();
@@ -134,7 +136,7 @@ VectorLanes turn_normals(RollingScratch& rolling, const VectorLanes& tool) noexc
   return sum;
 }
 
-/// Motions along the rows: those of the device, and what the turning moves surface and tool by.
+/// Adds to the rows the motions of the device, and those of surface and tool by the rotation of normals.
 template <int D>
 void add_motion_to_rows(Scratch& scratch, const VectorLanes& given_way, Index number) noexcept {
   const RollingScratch& rolling = scratch.changes.rolling;
@@ -149,7 +151,7 @@ void add_motion_to_rows(Scratch& scratch, const VectorLanes& given_way, Index nu
   }
 }
 
-/// Takes the change of the contact forces; its sum on the tool.
+/// Stores the change of the contact forces; returns its sum on the tool.
 template <int D>
 VectorLanes take_forces(Scratch& scratch, Index number) noexcept {
   RollingScratch& rolling = scratch.changes.rolling;
@@ -165,7 +167,7 @@ VectorLanes take_forces(Scratch& scratch, Index number) noexcept {
   return sum;
 }
 
-/// The limits of series of which the last two steps are known, and go on shrinking at that rate.
+/// Replaces series by their limits, assuming that they continue to shrink at the rate of the last two steps.
 void go_to_limit(const VectorLanes& step, const VectorLanes& last_step, VectorLanes& change) noexcept {
   const Lanes both = step[0] * last_step[0] + step[1] * last_step[1] + step[2] * last_step[2];
   const Lanes before = squared(last_step).max(std::numeric_limits<double>::min());

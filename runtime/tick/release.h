@@ -1,15 +1,15 @@
-// A body that is let go begins to move freely.
+// Release of a body, after which it moves freely.
 #pragma once
 
 #include "runtime/tick/state.h"
 
 namespace palpate {
 
-/// Whether a body with dynamics is let go in this tick: some tool has lost what it touched in the tick
-/// before, or ended its hold.
+/// True if a body with dynamics is released in this tick: some tool has lost the contact of the last tick, or
+/// ended its hold.
 bool is_released(const Body& body, const State& state) noexcept;
 
-/// Turns forces that ended with this tick into free motion (theory.md section 5), and ends the tick of the
+/// Converts forces that ended with this tick into free motion (theory.md section 5), and ends the tick of the
 /// motion.
 void release(const Body& body, State& state) noexcept;
 

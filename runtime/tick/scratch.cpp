@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t most_simplices_left_out = 2048;  // that are kept: what is beyond is counted alone
+constexpr std::size_t most_simplices_left_out = 2048;  // stored; further ones are only counted
 
 /// A contact has up to d rows, and d - 1 for the tilt of its face.
 Index most_rows(const Body& body, Index max_contacts) {
@@ -23,19 +23,19 @@ Index few(Index max_contacts) {
   return std::min(max_contacts, tuning.many.few_contacts);
 }
 
-/// Rows of the direct solvers' problems: those of few contacts, or of more without friction, which have one
+/// Rows of the direct solvers' problems: those of few contacts, or of more frictionless ones, each with one
 /// row and those of its tilt.
 Index few_rows(const Body& body, Index max_contacts) {
   return std::max(most_rows(body, few(max_contacts)),
                   body.dimension() * std::min(max_contacts, tuning.many.few_frictionless));
 }
 
-/// None where contacts are always few.
+/// Capacity for many contacts; 0 if there are always few.
 Index many(Index max_contacts) {
   return max_contacts > tuning.many.few_closed ? max_contacts : 0;
 }
 
-/// Twice as many as contacts, so that a feature is soon found.
+/// Twice the number of contacts, so that a feature is found quickly.
 std::size_t places_of_features(Index max_contacts) {
   return std::bit_ceil(size(2 * max_contacts));
 }

@@ -1,4 +1,4 @@
-// The workspace of a tick.
+// Workspace of a tick.
 #pragma once
 
 #include <array>
@@ -21,51 +21,50 @@
 
 namespace palpate {
 
-/// The most that a tick has used of what has fixed room.
+/// Largest use of each fixed capacity by a tick.
 struct HighWater {
   Index near_nodes = 0;      ///< of NearField::capacity
   Index contact_points = 0;  ///< of State::max_contacts
   Index unknowns = 0;        ///< rows of the contact problem, of Scratch::rows
-  Index simplices = 0;       ///< near a tool, of DetectionScratch::pairs; more were there where it is larger
+  Index simplices = 0;       ///< near a tool, of DetectionScratch::pairs; if larger, not all were examined
 };
 
-/// A contact point on its way into the contact problem.
+/// Contact point before it is added to the contact problem.
 struct UpcomingContact {
-  Index last = -1;          ///< the same one in LastContacts
-  bool stays_open = false;  ///< in this tick: it has no rows
-  bool has_place = false;   ///< in AssemblyScratch::order
-  Vec3 motion =
-      Vec3::Zero();  ///< of tool and surface against each other if no force changes, and the gap [m]
+  Index last = -1;             ///< number of the same contact in LastContacts
+  bool stays_open = false;     ///< open in this tick: it has no rows
+  bool has_place = false;      ///< it has a place in AssemblyScratch::order
+  Vec3 motion = Vec3::Zero();  ///< relative motion of tool and surface if no force changes, and the gap [m]
 };
 
-/// A group of surface nodes that were one contact point in the tick before.
+/// Group of surface nodes that was one contact point in the last tick.
 struct MergedGroup {
-  Index last = -1;      ///< in LastContacts
-  double defect = 0.0;  ///< how much its members' gaps differ from their mean at most [m]
+  Index last = -1;      ///< number in LastContacts
+  double defect = 0.0;  ///< largest deviation of its members' gaps from their mean [m]
 };
 
-/// Workspace of the merging of contact points.
+/// Workspace for merging contact points.
 struct MergingScratch {
   MergingScratch(Index surface_nodes, Index groups, Index most_members, Index max_contacts);
 
-  std::vector<Index> candidate_of_node;  ///< [S] the candidate at a surface node, -1 none, -2 several
-  std::vector<MergedGroup> merged;       ///< [max_contacts] in the tick before
-  std::vector<double> weights;           ///< [members] of the group that is merged
-  std::vector<Eigen::Matrix3d> maps;     ///< [members] of it
-  std::vector<std::int64_t> feature;     ///< [groups] of the contact point of each, -1 none
-  bool has_changed = false;              ///< other nodes are merged than in the tick or pass before
+  std::vector<Index> candidate_of_node;  ///< [S] candidate at a surface node; -1: none, -2: several
+  std::vector<MergedGroup> merged;       ///< [max_contacts] groups of the last tick
+  std::vector<double> weights;           ///< [members] weights of the group being merged
+  std::vector<Eigen::Matrix3d> maps;     ///< [members] maps of the group being merged
+  std::vector<std::int64_t> feature;     ///< [groups] feature of each group's contact point; -1: none
+  bool has_changed = false;              ///< other nodes are merged than in the last tick or pass
 };
 
-/// The contact points of the tick before (or the pass before), found by their features.
+/// Contact points of the last tick or pass, indexed by their features.
 class LastContacts {
  public:
   explicit LastContacts(Index max_contacts);
 
-  /// Keeps these.
+  /// Stores these contact points.
   void remember(std::span<const ContactPoint> now) noexcept;
-  /// Lists all anew, as features have changed.
+  /// Rebuilds the index after features have changed.
   void list_features() noexcept;
-  /// Number of the contact with this feature, -1 where there was none.
+  /// Number of the contact with this feature; -1 if there is none.
   [[nodiscard]] Index number_of(std::int64_t feature) const noexcept;
 
   std::vector<ContactPoint> contacts;  ///< [max_contacts]
@@ -74,97 +73,99 @@ class LastContacts {
  private:
   void enter(Index number) noexcept;
 
-  std::vector<Index> of_feature_;  // [power of 2] their numbers, hashed by feature
+  std::vector<Index> of_feature_;  // [power of 2] numbers of contacts, hashed by feature
 };
 
 /// Workspace of contact detection; S surface nodes, F simplices.
 struct DetectionScratch {
   DetectionScratch(const Body& body, Index tools, Index max_contacts);
 
-  std::vector<Index> found;              ///< [F] simplices near a tool; free motion uses it too
+  std::vector<Index> found;              ///< [F] simplices near a tool; also used by free motion
   std::vector<double> found_distance;    ///< [F] squared [m^2]
-  std::size_t found_count = 0;           ///< of `found`, within a tool's reach
+  std::size_t found_count = 0;           ///< entries of `found` within a tool's reach
   std::vector<TouchingPair> pairs;       ///< [8 max_contacts]
-  std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] before they are merged, and the deepest
-                                         ///< chosen
+  std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] before merging, and before the deepest
+                                         ///< are chosen
   Index candidate_count = 0;
-  Index simplex_ahead = -1;               ///< soon to be within a tool's reach; -1: none
-  std::vector<Index> candidate_at_node;   ///< [S] candidate at a surface node that was found last
-  std::vector<Index> candidates_between;  ///< [as candidates] those that are no surface node
+  Index simplex_ahead = -1;               ///< a simplex soon within a tool's reach; -1: none
+  std::vector<Index> candidate_at_node;   ///< [S] last candidate found at a surface node
+  std::vector<Index> candidates_between;  ///< [as candidates] candidates that are not at a surface node
   Index between_count = 0;
-  std::vector<LeftOut> left_out;  ///< places for which there was no room
+  std::vector<LeftOut> left_out;  ///< places that exceed the capacity
   Index left_out_count = 0;
 };
 
-/// Workspace of the assembly of W and b.
+/// Workspace for the assembly of W and b.
 struct AssemblyScratch {
   AssemblyScratch(const Body& body, Index max_contacts, Index near_nodes);
 
-  std::vector<std::ptrdiff_t> row_first;        ///< [few rows] column of C of the one node of a row
-  std::vector<std::array<double, 4>> row_body;  ///< [few rows] what the row has of it
-  std::vector<double> row_response;             ///< [d near_nodes] a column of Xi J^T [m/N]
-  std::vector<double> guess_force;              ///< [d near_nodes] of many contacts [N]
-  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] of many contacts
-  std::vector<Index> order;                     ///< [max_contacts] of many contacts: who comes to each place
-  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] `linearise` of many contacts: change of the
-                                          ///< force by a motion of the tool's device, a column an axis [N/m]
-  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] of the tick or pass before
+  std::vector<std::ptrdiff_t> row_first;        ///< [few rows] column of C of the row's only node
+  std::vector<std::array<double, 4>> row_body;  ///< [few rows] factors of the row for that node
+  std::vector<double> row_response;             ///< [d near_nodes] column of Xi J^T [m/N]
+  std::vector<double> guess_force;              ///< [d near_nodes] many contacts [N]
+  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] many contacts
+  std::vector<Index> order;                     ///< [max_contacts] many contacts: the contact at each place
+  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] from `linearise` with many contacts: change of
+                                          ///< the force by a motion of the tool's device, one column per axis
+                                          ///< [N/m]
+  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] those of the last tick or pass
   Index response_count = 0;
-  BodyCompliance compliance;        ///< of many contacts: the body's
-  std::vector<float> coupling;      ///< [6 x rows] of many contacts: forces and moments
-  std::vector<double> tilt_spring;  ///< [rows] of edges and faces [m/N]
+  BodyCompliance compliance;        ///< many contacts: compliance of the body
+  std::vector<float> coupling;      ///< [6 x rows] many contacts: forces and moments
+  std::vector<double> tilt_spring;  ///< [rows] compliance of the tilt of edges and faces [m/N]
 };
 
-/// The solvers, and how the last pass went.
+/// Solvers, and the result of the last pass.
 struct SolverScratch {
   SolverScratch(const Body& body, Index max_contacts);
 
   ActiveSet active_set;        ///< without friction
   ConeSolver cone_solver;      ///< with friction
-  NewtonKrylov newton_krylov;  ///< of many contacts
-  bool is_solved = true;       ///< to its tolerance
-  bool was_improved = false;   ///< few contacts took a second solver
+  NewtonKrylov newton_krylov;  ///< many contacts
+  bool is_solved = true;       ///< solved to its tolerance
+  bool was_improved = false;   ///< few contacts needed the second solver
 };
 
-/// Workspace of the error estimate of a best effort.
+/// Workspace for the error estimate of a best effort.
 struct ForceErrorScratch {
   ForceErrorScratch(const Body& body, Index tools, Index max_contacts);
 
-  Imbalance imbalance;                  ///< of a problem that was not solved
-  std::vector<Vec3> missing_force;      ///< [tools] of the solver [N]
+  Imbalance imbalance;                  ///< for an unsolved problem
+  std::vector<Vec3> missing_force;      ///< [tools] from the solver [N]
   std::vector<Index> left_out_nodes;    ///< [sampled] stored nodes
-  std::vector<double> left_out_blocks;  ///< [d x d sampled] Xi of these [m/N]
+  std::vector<double> left_out_blocks;  ///< [d x d sampled] Xi of these nodes [m/N]
 };
 
-/// Workspace of linearisation: how forces answer to motions.
+/// Workspace of linearisation: response of the forces to motions.
 struct ChangeScratch {
   ChangeScratch(const Body& body, Index max_contacts);
 
-  std::vector<double> of_rows;    ///< [d x rows] db, an axis after the other [m]
+  std::vector<double> of_rows;    ///< [d x rows] db for each axis, concatenated [m]
   std::vector<double> of_forces;  ///< [d x rows] dlambda [N]
-  RollingScratch rolling;         ///< the turning of normals
+  RollingScratch rolling;         ///< rotation of normals
 };
 
-/// What stages of a tick hand to each other, by who fills it. No tick needs it from the one before: only
-/// `high_water` goes on, the compliance and responses of many contacts, without which they are computed from
-/// nothing; the problem's forces may be read until the next tick. Sized at start.
+/// Data passed between the stages of a tick, grouped by the stage that writes them. No tick needs them from
+/// the previous one, except `high_water` and the compliance and responses of many contacts, which otherwise
+/// are computed from scratch. The problem's forces may be read until the next tick. Allocated at
+/// construction.
 struct Scratch {
-  /// Room for the tools' contacts: `max_contacts` of all tools together, and what fits into the near field.
+  /// Capacities: `max_contacts` contacts of all tools together, and the nodes of the near field.
   Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near);
 
   LastContacts last;
   DetectionScratch detection;
   MergingScratch merging;
-  bool is_first_pass = true;     ///< solve_contact: of the tick's Newton passes
+  bool is_first_pass = true;     ///< solve_contact: first of the tick's Newton passes
   ContactProblem problem;        ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;  ///< [rows] assembly: J
   AssemblyScratch assembly;
   SolverScratch solvers;
   ForceErrorScratch force_error;
-  GreensErrorScratch greens_error;       ///< linearise: of compressed Green's functions
+  GreensErrorScratch greens_error;       ///< linearise: for compressed Green's functions
   ChangeScratch changes;                 ///< linearise
-  std::vector<double> far_displacement;  ///< [d nodes] far surface: what is renewed in a tick [m]
-  HighWater high_water;                  ///< detection and assembly: since the start
+  std::vector<double> far_displacement;  ///< [d nodes] far surface: updated displacement of a tick [m]
+  HighWater high_water;                  ///< detection and assembly: maxima since the start
 };
 
 }  // namespace palpate

@@ -57,7 +57,7 @@ std::vector<ToolState> make_tools(const StateOptions& options) {
   return tools;
 }
 
-/// Mean of the surface's own compliance over some nodes: the scale of what is soft.
+/// Mean of the surface's own compliance over some nodes: the scale of a soft part.
 double mean_compliance(const Body& body) {
   const std::vector<Index>& nodes = body.free_surface_nodes();
   const std::size_t stride = std::max<std::size_t>(1, nodes.size() / 64);
@@ -77,7 +77,8 @@ double least_compliance_of_a_node(const Body& body) {
   return least;
 }
 
-/// A contact has up to three nodes; those of many share theirs, and are merged where no overlay is.
+/// Capacity of the near field. A contact has up to three nodes; many contacts have nodes in common, and are
+/// merged if there is no overlay.
 Index near_room(const Body& body, const StateOptions& options) {
   const Index m = options.max_contacts;
   const Index most = options.patch_nodes > 0 ? std::min(3 * m + 32, 2 * m + 96) : 4 * m + 96;

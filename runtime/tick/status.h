@@ -1,4 +1,4 @@
-// What a tick could not do.
+// Status bits of a tick.
 #pragma once
 
 #include <array>
@@ -7,24 +7,24 @@
 
 namespace palpate {
 
-/// What a tick could not do; no bit is set when all is well. Bit 5 is free. The reference shows these
+/// Limitations of a tick; no bit is set if there are none. Bit 5 is unused. The book's reference shows these
 /// comments.
 enum class StepStatus : std::uint32_t {
   ok = 0,
   nothing_in_reach = 1U << 0,   ///< grab is pressed, the tool touches nothing and no surface is within reach
-  capacity_full = 1U << 1,      ///< there is no room for another node or contact: the deepest are kept
-  unsettled = 1U << 2,          ///< nothing has moved for long, and the contact forces still change
-  pose_not_finite = 1U << 3,    ///< the pose was ignored: the last valid one holds
-  result_not_finite = 1U << 4,  ///< the force overflowed: the last valid result holds
+  capacity_full = 1U << 1,      ///< the capacity for nodes or contacts is exceeded: the deepest are kept
+  unsettled = 1U << 2,          ///< contact forces still change although nothing has moved for long
+  pose_not_finite = 1U << 3,    ///< the pose was ignored: the last valid one is used
+  result_not_finite = 1U << 4,  ///< the force overflowed: the last valid result is used
   inside_body = 1U << 6,        ///< the tool is inside the body and touches nothing until it is out
   pose_limited = 1U << 7,       ///< the pose jumped: the tool follows at a bounded speed
   not_converged = 1U << 8,      ///< the contact forces did not reach their tolerance within the budget
-  force_limited = 1U << 9,      ///< the force was cut to the largest of the tool (`--max-force`)
-  handing_over = 1U << 10,      ///< the force approaches that of the contact gradually, so as not to kick
+  force_limited = 1U << 9,      ///< the force was limited to the tool's largest (`--max-force`)
+  handing_over = 1U << 10,      ///< the force approaches that of the contact gradually, to avoid a kick
   older_patch = 1U << 11,       ///< the overlay for this place was not ready: an older one was used, or none
   late_motion = 1U << 12,    ///< the free motion of the body was not ready in time: the surface waits for it
-  rigid_contact = 1U << 13,  ///< the tool presses on what cannot move: only its coupling gives way
-  near_step_limit = 1U << 14,  ///< a live body's explicit step is close to the longest stable one
+  rigid_contact = 1U << 13,  ///< the tool presses on a rigid part: only its coupling deforms
+  near_step_limit = 1U << 14,  ///< a live body's explicit time step is close to the stability limit
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {

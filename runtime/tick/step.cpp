@@ -52,7 +52,7 @@ void count_still_ticks(State& state) noexcept {
   state.still_ticks = still ? state.still_ticks + 1 : 0;
 }
 
-/// Tells where contact has not come to rest although nothing has moved for long.
+/// Sets the status of tools whose contact has not come to rest although nothing has moved for long.
 void note_unsettled_tools(State& state) noexcept {
   if (static_cast<double>(state.still_ticks) * state.tick < tuning.hand.patience) return;
   for (ToolState& tool : state.tools) {
@@ -62,7 +62,7 @@ void note_unsettled_tools(State& state) noexcept {
   }
 }
 
-/// How what a tool touches moves on its own.
+/// Computes the mean free motion of the surface touched by a tool, weighted by force.
 void note_surface_change(const Body& body, const State& state, ToolState& tool, Index number) noexcept {
   tool.surface_change.setZero();
   if (!state.surface.motion.active()) return;

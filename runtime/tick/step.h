@@ -1,4 +1,4 @@
-// One tick: tools in, wrenches out.
+// One tick: poses of the tools in, wrenches out.
 #pragma once
 
 #include <span>
@@ -10,18 +10,18 @@
 
 namespace palpate {
 
-/// One tick for each tool's pose (as many as the state has tools). The tool is pushed out of the deformed
-/// surface, exactly: gaps >= 0, normal forces >= 0, one of them zero, with Coulomb friction where the surface
-/// has it, over the compliance of the body and of the coupling together. No heap, lock, system call or
-/// exception; never a force that is not finite.
+/// Performs one tick with a pose for each tool of the state. The tool is pushed out of the deformed surface
+/// exactly: gaps >= 0, normal forces >= 0, one of them zero, with Coulomb friction where the surface has it,
+/// for the compliance of body and coupling together. No heap allocation, lock, system call or exception;
+/// forces are always finite.
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept;
 
-/// One tick of a state with one tool.
+/// Performs one tick of a state with one tool.
 StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept;
 
-/// u = Xi E f: displacement u [n] of all stored nodes [m] by the present contact forces, relative to rest
-/// (theory.md section 3), and what the body's free motion adds. What is seen is node + u0 + u. For the eye;
-/// not needed by a tick.
+/// u = Xi E f: computes the displacement u [n] of all stored nodes [m] by the present contact forces,
+/// relative to rest (theory.md section 3), plus the body's free motion. The visible position is node + u0 +
+/// u. For display; a tick does not need it.
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept;
 
 }  // namespace palpate

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t most_ranges = 256;  // of near runs that are renewed in one tick
+constexpr std::size_t most_ranges = 256;  // ranges of near runs updated in one tick
 
 /// Moves a surface node that is not near a tool.
 void move_far(const Body& body, SurfaceState& surface, Index node, const Vec3& u) noexcept {
@@ -24,7 +24,7 @@ void move_far(const Body& body, SurfaceState& surface, Index node, const Vec3& u
   surface.tree.move(node, position);
 }
 
-/// u of a surface node that the body's nodes give, as it was renewed last.
+/// Displacement u of a surface node from the body's nodes, as of their last update.
 Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index node) noexcept {
   const SurfaceParts parts = body.surface_parts(node);
   Vec3 sum = Vec3::Zero();
@@ -33,7 +33,7 @@ Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index no
   return sum;
 }
 
-/// What the near field's load moves ranges of stored nodes by.
+/// Computes the displacement of ranges of stored nodes by the near field's load.
 void displace_ranges(const Body& body, const SurfaceState& surface, std::span<double> room,
                      std::span<const NodeRange> ranges) noexcept {
   std::size_t nodes = 0;
@@ -43,8 +43,8 @@ void displace_ranges(const Body& body, const SurfaceState& surface, std::span<do
                                  room.first(static_cast<std::size_t>(body.dimension()) * nodes));
 }
 
-/// Renews the displacement of stored nodes [first, end) to u, and moves the surface nodes that follow them
-/// until none of `moves` is left; where it ends.
+/// Updates the displacement of stored nodes [first, end) to u, and moves the surface nodes that follow them
+/// until `moves` is used up; returns the end of the updated nodes.
 Index renew_nodes(const Body& body, SurfaceState& surface, const double* u, Index first, Index end,
                   Index& moves) noexcept {
   const int d = body.dimension();
@@ -81,7 +81,7 @@ void find_near_runs(const Body& body, const NearField& near, FarSweep& sweep) no
   }
 }
 
-/// Renews `most` nodes of the near runs, which take turns, each once at most. False where there are none.
+/// Updates up to `most` nodes of the near runs, in turn, each at most once. False if there are none.
 bool renew_near_runs(const Body& body, SurfaceState& surface, std::span<double> room, Index most) noexcept {
   const NodeRuns& runs = body.runs();
   FarSweep& sweep = surface.sweep;
@@ -114,7 +114,7 @@ bool renew_near_runs(const Body& body, SurfaceState& surface, std::span<double> 
   return true;
 }
 
-/// Renews the next `most` nodes of the whole body.
+/// Updates the next `most` nodes of the whole body.
 void renew_all_in_turn(const Body& body, SurfaceState& surface, std::span<double> room, Index most) noexcept {
   FarSweep& sweep = surface.sweep;
   const Index nodes = body.greens().nodes();

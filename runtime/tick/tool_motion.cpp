@@ -10,9 +10,9 @@
 namespace palpate {
 namespace {
 
-constexpr double farthest = 1e100;  // that is a place [m]: squares of distances are numbers
+constexpr double farthest = 1e100;  // largest plausible coordinate [m]: squares of distances stay finite
 
-/// Not with Eigen's stableNorm, whose last bits depend on where in memory a vector lies.
+/// Eigen's stableNorm is not used: its last bits depend on the alignment of a vector.
 bool make_valid(ToolPose& pose, int dimension) noexcept {
   if (!(pose.position.array().abs() < farthest).all() || !pose.orientation.coeffs().allFinite()) return false;
   if (dimension == 2) {
@@ -27,7 +27,7 @@ bool make_valid(ToolPose& pose, int dimension) noexcept {
   return true;
 }
 
-/// How far a tool's points move at most from one pose to another.
+/// Largest displacement of a tool's points from one pose to another.
 double motion(const Tool& tool, const ToolPose& from, const ToolPose& to) noexcept {
   const double turned = extent(tool) > 0.0 ? from.orientation.angularDistance(to.orientation) : 0.0;
   return (to.position - from.position).norm() + turned * extent(tool);
@@ -39,8 +39,8 @@ ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcep
           .grab = to.grab};
 }
 
-/// Farther from the resting body than the body is large, whatever the tool is caught in: a fold of the
-/// surface, or behind the body on a soft spring.
+/// True if the device is farther from the resting body than the body is large, whatever catches the tool: a
+/// fold of the surface, or a soft spring behind the body.
 bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
   const double distance = body.bounds().exteriorDistance(tool.device.position);
   return !tool.holding && distance > extent(tool.tool) + body.bounds().diagonal().norm();
@@ -60,7 +60,7 @@ void follow_device(const Body& body, const SurfaceTree& tree, DetectionScratch& 
   const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
   const double least = tuning.following.margin * body.mean_surface_edge();
   const auto place = [&] {
-    tool.last_device = wanted;  // nothing that is felt now comes from a motion
+    tool.last_device = wanted;  // forces now do not come from a motion
     tool.pose = tool.device = wanted;
     tool.margin = least;
     tool.placed = true;
@@ -90,7 +90,7 @@ void follow_device(const Body& body, const SurfaceTree& tree, DetectionScratch& 
   tool.device = wanted;
   tool.margin = least + 2.0 * std::min(wanted_motion,
                                        tuning.following.most_motion * size);  // tool and surface may meet
-  if (tool.contacts == 0 && !tool.holding) {  // free: it is where the device was
+  if (tool.contacts == 0 && !tool.holding) {  // free: it was at the device's position
     const double moved = motion(tool.tool, tool.pose, tool.device);
     tool.margin = least + 2.0 * std::min(moved, tuning.following.most_motion * size);
   }

@@ -1,17 +1,17 @@
-// Where the tools are: after the device, and pushed away by the contact.
+// Motion of the tools: with the device, and away from the contact.
 #pragma once
 
 #include "runtime/tick/state.h"
 
 namespace palpate {
 
-/// The device's pose for this tick: where it wants to be, but no farther from the last one than contact can
-/// follow; through free space as far as it is free. A tool that has not been clear of the body, or
-/// is lost in it, is placed there and not engaged.
+/// Sets the device's pose for this tick: the requested one, but no farther from the last one than contact can
+/// follow, or in free space as far as it is free. A tool that has not been clear of the body, or is lost in
+/// it, is placed there without being engaged.
 void follow_device(const Body& body, const SurfaceTree& tree, DetectionScratch& detection, ToolState& tool,
                    ToolPose wanted) noexcept;
 
-/// The tools to where the couplings let their contact wrenches take them.
+/// Moves the tools to where the couplings hold them under their contact wrenches.
 void move_tools(const Body& body, State& state) noexcept;
 
 }  // namespace palpate
