@@ -274,7 +274,7 @@ void write_numbers(const RecordingFile& recording, SessionPictures* pictures, co
   }
   made.take_its_place();
   if (frames.empty()) {
-    std::filesystem::remove(xdmf_path(hdf5));  // of an earlier export
+    std::filesystem::remove(xdmf_path(hdf5));  // left over from an earlier export
   } else {
     write_xdmf(hdf5, recording.surface(), times);
   }

@@ -48,7 +48,7 @@ class MouseDevice : public Device {
   double period_;  // [s]
   DeviceState state_;
   std::int64_t heard_ = 0;     // number of the last message
-  std::int64_t heard_at_ = 0;  // its time of arrival [ns]
+  std::int64_t heard_at_ = 0;  // time of arrival [ns]
   std::int64_t heard_lifts_ = 0;
   bool is_lost_ = false;
 };

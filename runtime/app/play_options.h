@@ -25,7 +25,7 @@ struct DeviceChoice {
   Kind kind = Kind::script;
   std::string target;
   std::string profile;
-  std::string text;  ///< as given on the command line
+  std::string text;  ///< text on the command line
 
   /// True if a person moves it, which cannot be paused.
   [[nodiscard]] bool is_live() const noexcept {
@@ -39,7 +39,7 @@ struct PlayOptions {
   DeviceChoice device;
   std::shared_ptr<const RecordingFile> session;  ///< session to replay
   SettingsText settings_text;                    ///< settings as given, or as in the session
-  Settings settings;                             ///< the same, parsed
+  Settings settings;                             ///< parsed settings
   std::optional<double> duration;  ///< [s]; default: to the end of script or session, or until interrupted
   std::optional<int> processor;    ///< processor reserved for the loop
   bool fast = false;

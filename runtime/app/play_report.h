@@ -19,7 +19,7 @@ struct PlayedRun {
   const Body& body;
   const Tool& tool;
   const State& state;                  ///< after the last tick
-  const LoopReport& report;            ///< of the whole run
+  const LoopReport& report;            ///< report on the whole run
   const PlayedParts* parts = nullptr;  ///< if it may have been restarted; the state is the last session's
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;

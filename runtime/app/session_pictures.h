@@ -53,7 +53,7 @@ class SessionPictures {
   [[nodiscard]] std::optional<TickRecord> tick(std::int64_t number) const;
 
   RecordingFile file_;
-  mutable RecordedPictures pictures_;  // its workspace changes
+  mutable RecordedPictures pictures_;  // mutable: it has a workspace
 };
 
 }  // namespace palpate

@@ -97,7 +97,7 @@ class ViewedPlay : public ViewedRun {
   LoopControl control_;
   bool recording_failed_ = false;
 
-  Fault latched_ = Fault::none;  // of the previous session, if a hand is in the device
+  Fault latched_ = Fault::none;  // fault of the previous session, if a hand is in the device
 
   std::chrono::steady_clock::time_point next_change_{};  // earliest next computation of the surface's change
 

@@ -62,7 +62,7 @@ class LiveCompliance {
   int steps_since_ = 0;    // steps since the last renewal of W
   Shape at_, next_, now_;  // at the factorisation of W, at that of the next W, and after the last step
   Mat3 R_delivered_ = Mat3::Identity();
-  PackedGreens W_;  // as factorised; empty for that of the body at rest
+  PackedGreens W_;  // factorised W; empty for that of the body at rest
   std::shared_ptr<const Greens> renewed_;
   std::vector<std::shared_ptr<const Greens>> kept_;
   std::int64_t renewals_ = 0, turns_ = 0;

@@ -72,7 +72,7 @@ class LiveMotion final : public MotionStepper {
   std::vector<double> by_load_;       // [n] W f of the last job
   std::vector<double> by_last_load_;  // [n] W f_p
   Eigen::VectorXd found_;             // [d N] positions of all nodes when the tool was last away,
-  Eigen::VectorXd untouched_;         // [d N] the same, moved with the body, at the end of the predicted step
+  Eigen::VectorXd untouched_;         // [d N] found_ moved with the body, at the end of the predicted step
   std::vector<Index> far_;            // [N] workspace: nodes in the order of their distance from the tool
   mutable std::mutex mutex_;          // guards telling_
   LiveTelling telling_;

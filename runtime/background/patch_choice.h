@@ -49,7 +49,7 @@ class PatchChoice {
  private:
   struct Followed {
     Index centre = -1;
-    Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m/tick]
+    Vec3 velocity = Vec3::Zero();  // smoothed velocity of the device [m/tick]
   };
 
   void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;

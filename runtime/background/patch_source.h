@@ -37,7 +37,7 @@ struct PatchSourceOptions {
 /// Statistics on overlays.
 struct PatchCounts {
   std::int64_t ticks = 0;       ///< ticks with a tool near the body
-  std::int64_t older = 0;       ///< of these, ticks with an older patch or none
+  std::int64_t older = 0;       ///< ticks among these with an older patch or none
   std::int64_t in_contact = 0;  ///< ticks in contact
   std::int64_t older_in_contact = 0;
   std::int64_t switches = 0;  ///< changes of the patch

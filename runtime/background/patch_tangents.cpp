@@ -11,7 +11,7 @@ namespace {
 // One step: it ends where the tick's contact, by the last tangent, has the surface. Further steps under
 // constant forces lead away from a steady contact, whose forces would not stay constant.
 constexpr PatchEffort patch_effort{.tolerance = 1e-8, .most_steps = 1};
-constexpr double no_change = 1e-6;  // of forces: the tangent's error is its square
+constexpr double no_change = 1e-6;  // change of forces; the tangent's error is its square
 
 }  // namespace
 
@@ -33,7 +33,7 @@ bool PatchTangents::follow(const PatchLoad& load) noexcept {
     if (is_settled(load)) return false;
     make(load);
   } catch (const std::exception&) {  // out of memory or too flat elements: the tick continues without
-    is_balanced_ = true;             // these forces are not retried
+    is_balanced_ = true;             // no second try for these forces
     patch_ = nullptr;
     const std::lock_guard lock(mutex_);
     ++telling_.failed;

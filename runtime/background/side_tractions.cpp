@@ -150,7 +150,7 @@ class EdgeRows {
   const std::vector<double>& area_;
   std::vector<Row> rows_;                       // [places]
   std::vector<std::uint8_t> done_;              // [places]
-  std::vector<std::vector<Index>> beside_;      // [places] of those at edges
+  std::vector<std::vector<Index>> beside_;      // [places] neighbours of places at edges
   std::map<Index, std::vector<Index>> places_;  // places with an area, of each node where sides meet
 };
 

@@ -76,7 +76,7 @@ void StressRows::apply_turned(std::span<const Vec3> at, bool is_plane, std::span
                               std::span<Mat3> turn, std::span<Stress> stress) const noexcept {
   for (std::size_t row = 0; row < constant.size(); ++row) {
     const auto begin = static_cast<std::size_t>(first[row]), end = static_cast<std::size_t>(first[row + 1]);
-    Mat3 fit = Mat3::Zero();  // its polar factor is the common rotation
+    Mat3 fit = Mat3::Zero();  // deformation; its polar factor is the common rotation
     for (std::size_t k = begin; k < end; ++k) {
       const Vec3 X = at[node[k]] - at[row];
       fit.noalias() += (X + u[node[k]] - u[row]) * X.transpose();

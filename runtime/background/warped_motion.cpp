@@ -15,7 +15,7 @@ constexpr WarpBalanceOptions effort{.tolerance = 1e-4, .most_rounds = 3};
 constexpr double most_behind = 0.03;  // [rad] by which W may lag
 constexpr double most_wrong = 0.3;    // error of W, as a fraction of a step's displacement of loaded nodes
 constexpr double least_wrong = 1e-6;  // fraction of their displacement below which it is negligible
-constexpr double least_part = 1e-6;   // of the largest: smaller eigenvalues of a compliance are rounding
+constexpr double least_part = 1e-6;   // [largest] smaller eigenvalues of a compliance are rounding
 
 /// Pseudo-inverse of a positive semidefinite matrix; eigenvalues within rounding of zero are dropped.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& A) {

@@ -19,7 +19,7 @@ std::int64_t count_ticks(const Body& body, double tick) {
   if (model.dynamics.method == DynamicsMethod::none) return 1;
   const double step = model.dynamics.newmark.time_step;
   const double ticks = std::round(step / tick);
-  if (body.contact_model() == ContactModel::warped)  // its steps have no time of their own
+  if (body.contact_model() == ContactModel::warped)  // steps without a time of their own
     return static_cast<std::int64_t>(std::max(1.0, ticks));
   const bool dynamic = body.contact_model() == ContactModel::dynamic;
   const bool fits = ticks >= 1.0 && std::abs(ticks * tick - step) <= 1e-9 * step;

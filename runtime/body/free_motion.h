@@ -117,7 +117,7 @@ class FreeMotion {
   /// Adds sign * u [n] to the motion until the next sample, to compensate a change of the displacement by
   /// contact forces when their compliance changes. Call after `receive`.
   void take_over(const Body& body, std::span<const double> u, double sign) noexcept;
-  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< of the last sample
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< last sample's
   /// True if the last sample is from an explicit step close to the stability limit.
   [[nodiscard]] bool is_near_limit() const noexcept { return is_near_limit_; }
   /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.
@@ -165,7 +165,7 @@ class FreeMotion {
   std::int64_t sample_phase_ = 0;     // phase at which the sample arrived
   std::vector<double> u_before_, u_;  // [n] samples between which the tick lies
   double share_ = 1.0;                // weight of u_
-  std::vector<double> untouched_;     // [n] of a live body
+  std::vector<double> untouched_;     // [n] empty unless live
 
   // Per surface node.
   std::vector<std::int64_t> stamp_;  // tick of the value

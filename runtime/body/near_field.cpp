@@ -85,7 +85,7 @@ void NearField::begin_tick() noexcept {
 
 bool NearField::want(const Body& body, Index surface_node) noexcept {
   if (place_of(surface_node) < 0) {
-    if (body.aggregate_of(surface_node) >= 0) return false;  // its weights are unknown
+    if (body.aggregate_of(surface_node) >= 0) return false;  // weights unknown
     if (count_ == capacity_) {
       const Index place = longest_unwanted();
       if (place < 0) return false;

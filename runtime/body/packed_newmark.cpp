@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 
 constexpr int most_iterations = 200;
-constexpr double tolerance = 1e-14;  // of the residual of M a = b
+constexpr double tolerance = 1e-14;  // relative residual of M a = b
 constexpr double still = 1e-40;      // smaller numbers would become denormal, which is slow
 
 /// y += A x for a matrix given by the entries of its lower triangle.

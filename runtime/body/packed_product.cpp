@@ -51,7 +51,7 @@ template <class T>
 void multiply_rows(const std::array<const T*, columns>& a, const std::array<double, columns>& by,
                    const double* __restrict x, double* __restrict y, std::array<double, columns>& sums,
                    std::int64_t count) noexcept {
-  constexpr std::int64_t line = 64 / sizeof(T);  // of the cache
+  constexpr std::int64_t line = 64 / sizeof(T);  // entries per cache line
   std::array<Lanes<double>, columns> in_lanes{};
   std::int64_t i = 0;
   for (; i + line <= count; i += line) {

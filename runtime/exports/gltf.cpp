@@ -231,7 +231,7 @@ void write_glb(FileWriter& file, const std::string& name, const RecordedSurface&
   std::string text = json_text(scene);
   fill_up(text, ' ');
   fill_up(buffer.bytes, '\0');
-  constexpr std::size_t head_bytes = 8;  // of a chunk
+  constexpr std::size_t head_bytes = 8;  // header of a chunk
   std::string head = "glTF";
   append(head, 2);
   append(head, static_cast<std::uint32_t>(glb_header + 2 * head_bytes + text.size() + buffer.bytes.size()));

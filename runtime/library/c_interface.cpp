@@ -278,7 +278,7 @@ struct OwnLoop {
   std::optional<MotionSource> motion;
   std::int64_t ticks = 0;
   Latest<FoundStress> stress{FoundStress{}};
-  std::optional<SurfaceFrames> frames;  // its thread publishes the stress
+  std::optional<SurfaceFrames> frames;  // last member: its thread publishes the stress
   std::optional<SessionRecording> recording;
   std::size_t recorded_tool = 0;
 };

@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr int most_rounds = 400;  // of the solver; no tick waits for it
+constexpr int most_rounds = 400;  // limit of the solver; no tick waits for it
 
 /// Returns the normal and d - 1 tangents as columns; in the plane the tangent lies in it.
 Mat3 frame_of(const Vec3& normal, int d) noexcept {

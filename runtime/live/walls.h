@@ -10,8 +10,8 @@ namespace palpate {
 
 /// Half-space that bodies stay out of, or an axis-aligned box.
 struct Wall {
-  Vec3 normal = Vec3::UnitZ();                 ///< of the plane, unit vector, towards the bodies
-  double offset = 0.0;                         ///< of the plane: normal . x >= offset [m]
+  Vec3 normal = Vec3::UnitZ();                 ///< normal of the plane, unit vector, towards the bodies
+  double offset = 0.0;                         ///< half-space normal . x >= offset [m]
   double friction = 0.0;                       ///< Coulomb coefficient
   std::optional<std::pair<Vec3, Vec3>> box{};  ///< instead of the plane: lowest and highest corner [m]
 };

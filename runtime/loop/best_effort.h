@@ -45,9 +45,9 @@ struct BestEffort {
   [[nodiscard]] double median_share() const noexcept { return std::min(shares.median(), largest_share); }
 
   std::int64_t ticks = 0;
-  std::int64_t not_converged_ticks = 0;  ///< of these ticks
-  std::int64_t left_out_ticks = 0;       ///< of these ticks
-  std::int64_t late_ticks = 0;           ///< of these ticks; the body was not stepped
+  std::int64_t not_converged_ticks = 0;  ///< best-effort ticks without convergence
+  std::int64_t left_out_ticks = 0;       ///< best-effort ticks with contact points left out
+  std::int64_t late_ticks = 0;           ///< best-effort ticks in which the body was not stepped
   double largest_late_error = 0.0;       ///< in the late ticks [N]
   std::int64_t most_left_out = 0;        ///< most contact points left out of one tick
   double largest_error = 0.0;            ///< [N]

@@ -70,7 +70,7 @@ void DeviceLink::display(const DeviceCommand& command, const DeviceState& state,
 
 void DeviceLink::read_reports() noexcept {
   ask_for_priority(wire_priority);
-  bool is_open = true;   // as this thread left it
+  bool is_open = true;   // state left by this thread
   bool is_back = false;  // open again, but no report yet
   while (!stop_) {
     if (!is_open) {

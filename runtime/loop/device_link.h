@@ -50,7 +50,7 @@ class DeviceLink : public Device {
   [[nodiscard]] std::int64_t reports() const noexcept { return reports_; }            ///< reports so far
   [[nodiscard]] std::int64_t writes() const noexcept { return writes_; }              ///< writes so far
   [[nodiscard]] std::int64_t worst_write() const noexcept { return worst_write_; }    ///< [ns]
-  [[nodiscard]] std::int64_t extrapolated() const noexcept { return extrapolated_; }  ///< of these writes
+  [[nodiscard]] std::int64_t extrapolated() const noexcept { return extrapolated_; }  ///< extrapolated writes
 
  private:
   /// Command of the loop and the state that it was computed from.

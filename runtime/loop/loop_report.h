@@ -25,7 +25,7 @@ struct LoopReport {
   TimeHistogram lateness;                  ///< delay of the start of a tick [ns]
   TimeHistogram compute;                   ///< duration of the overlay's choice and `step` [ns]
   double largest_force = 0.0;              ///< largest computed force, on the body's side [N]
-  double largest_force_time = 0.0;         ///< its time [s]
+  double largest_force_time = 0.0;         ///< time of largest_force [s]
   double largest_force_depth = 0.0;        ///< depth to which the surface was pressed in then [m]
   double largest_force_stiffening = 1.0;   ///< mesh_stiffening.h, at that time
   double largest_jump = 0.0;               ///< largest change of the force between two ticks [N]

@@ -89,7 +89,7 @@ class Recorder {
   std::atomic<bool> waits_ = false;  // pushes wait
   // Used by the thread alone.
   TickRecord last_;                      // last tick written
-  double last_time_ = -1.0;              // its time; -1 before the first
+  double last_time_ = -1.0;              // time of last_; -1 before the first
   double kept_until_ = 0.0;              // time of the last checkpoint, if pushes wait
   std::optional<RecordedPicture> next_;  // picture not yet written
   std::thread thread_;

@@ -17,7 +17,7 @@ struct ReplayDifference {
   double largest = 0.0;          ///< largest difference of a force [N]
   double largest_time = 0.0;     ///< [s]
   std::int64_t first_tick = -1;  ///< first tick in which a computed field differs; -1: none
-  const char* first_field = "";  ///< that field, named as in a recording; the first one computed
+  const char* first_field = "";  ///< name of that field in a recording; the first one computed
 
   /// Adds the comparison of a later run, which began `ticks_before` and `time_before` [s] after this one.
   void add(const ReplayDifference& later, std::int64_t ticks_before, double time_before);

@@ -24,7 +24,7 @@ inline constexpr NumberRange tick_rates{1000.0, 5000.0, true, true, "from 1000 t
 /// Settings of a session. Each is an option of `palpate-runtime play` and has the same name in a recording;
 /// settings_table lists them.
 struct Settings {
-  Tool tool;                    ///< its reach is in `reach`
+  Tool tool;                    ///< tool, except its reach
   std::optional<double> reach;  ///< [m]; default: the longest edge of the surface
   Index max_contacts = 256;
   ContactModel contact = ContactModel::quasi_static;
@@ -36,7 +36,7 @@ struct Settings {
   bool warp = false;                                         ///< Green's functions rotate with the body
   LiveSettings live;                                         ///< a solver in place of Green's functions
   std::int64_t rate = 1000;                                  ///< ticks per second
-  double motion_scale = 1.0;                                 ///< as in WorkspaceOptions
+  double motion_scale = 1.0;                                 ///< see WorkspaceOptions
   double force_scale = 1.0;
   std::optional<Vec3> origin;           ///< origin of the device in the body's frame [m]
   std::string axes = "x,y,z";           ///< the body's axes along the device's axes

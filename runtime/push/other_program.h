@@ -53,7 +53,7 @@ class OtherProgram {
 
  private:
   std::filesystem::path program_;
-  bool leads_ = false;  // of a process group
+  bool leads_ = false;  // it leads a process group
   FileDescriptor output_, told_;
   int process_ = -1;
 };
@@ -61,7 +61,7 @@ class OtherProgram {
 /// Result of another program.
 struct ProgramEnd {
   int status = 0;      ///< exit status; 128 + the signal that ended it
-  std::string output;  ///< its output
+  std::string output;  ///< printed output
 };
 
 /// Runs a program to its end. It inherits the error stream, handles SIGINT and SIGTERM, and ends with this

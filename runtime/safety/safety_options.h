@@ -15,17 +15,17 @@ namespace palpate {
 struct SafetyOptions {
   double period = 0.001;          ///< period of the loop [s]
   double max_force = 3.0;         ///< [N]; the weakest hand-held device displays 3.3 (Touch)
-  double max_torque = 0.1;        ///< [N m]; half of what a sigma.7 displays
+  double max_torque = 0.1;        ///< [N m]; half that of a sigma.7
   double max_force_rate = 500.0;  ///< [N/s]; a wall of 1000 N/m hit at 0.5 m/s
   double max_torque_rate = 10.0;  ///< [N m/s]; the same wall at a lever of 2 cm
   double max_stiffness = 2000.0;  ///< stiffness of the local model [N/m]; that of a Polhem v3, between
                                   ///< Touch's 400 and omega's 5000
-  double max_damping = 5.0;  ///< damping added by the passivity controller [N s/m]: K T / 2 of 10 kN/m
-                             ///< (Colgate and Brown); 0: it only observes
-  double max_speed = 1.0;    ///< speed of the device [m/s]; palpation stays below 0.3
-  double ramp = 1.0;         ///< time from no to full force [s]; CHAI3D takes 2
-  double small_force = 0.1;  ///< force below which the gate may open [N]
-  double calm_time = 0.01;   ///< time for which the force must have been that small [s]
+  double max_damping = 5.0;       ///< damping added by the passivity controller [N s/m]: K T / 2 of 10 kN/m
+                                  ///< (Colgate and Brown); 0: it only observes
+  double max_speed = 1.0;         ///< speed of the device [m/s]; palpation stays below 0.3
+  double ramp = 1.0;              ///< time from no to full force [s]; CHAI3D takes 2
+  double small_force = 0.1;       ///< force below which the gate may open [N]
+  double calm_time = 0.01;        ///< time for which the force must have been that small [s]
   DeadlineOptions deadline{};
   SilenceOptions silence{};
   StaleOptions stale{};

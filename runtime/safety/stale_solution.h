@@ -25,10 +25,7 @@ class StaleSolution {
   Vec3 force(const DeviceCommand& solution, const Vec3& position, const Vec3& velocity, double age,
              double elapsed) noexcept;
 
-  [[nodiscard]] double share() const noexcept {
-    return share_;
-  }  ///< fraction of the force that may be
-     ///< displayed [0, 1]
+  [[nodiscard]] double share() const noexcept { return share_; }  ///< fraction of the force to display [0, 1]
 
   void reset() noexcept { share_ = 1.0; }
 

@@ -7,7 +7,7 @@ namespace palpate {
 
 struct WorkspaceOptions {
   Vec3 device_origin = Vec3::Zero();                         ///< origin in the device frame [m]
-  Vec3 body_origin = Vec3::Zero();                           ///< the same point in the body frame [m]
+  Vec3 body_origin = Vec3::Zero();                           ///< device_origin in the body frame [m]
   Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  ///< device axes to body axes
   double motion_scale = 1.0;                                 ///< s: metres in the body per device metre
   double force_scale = 1.0;                                  ///< c: newtons on the hand per body newton

@@ -28,7 +28,7 @@ class PictureDrawing {
 
  private:
   std::shared_ptr<const Scene> scene_;
-  // Those of the last picture. The patch is kept alive so that no other one can get its address.
+  // Cache for the last picture. The patch is kept alive so that no other one can get its address.
   std::shared_ptr<const Scene> patch_scene_;
   std::shared_ptr<const Patch> patch_;
   std::shared_ptr<const ScenePatch> drawn_patch_;

@@ -24,7 +24,7 @@ struct Scene {
   std::vector<std::array<Index, 3>> triangles;  ///< [T]
   std::vector<Index> elements;                  ///< [T] element of each triangle; empty in a recording
   std::vector<std::array<Index, 2>> edges;      ///< edges of the elements, without duplicates
-  std::vector<std::uint8_t> held;               ///< [S] as Model::fixed
+  std::vector<std::uint8_t> held;               ///< [S] see Model::fixed
   std::vector<std::uint8_t> materials;          ///< [T] in space with several materials; else empty
   InnerSurface inner;
   std::vector<Index> order;  ///< [S] node order in messages: neighbours follow each other
@@ -38,7 +38,7 @@ struct ScenePatch {
   std::vector<Vec3> nodes;                      ///< [m] positions without loads [m]
   std::vector<std::array<Index, 3>> triangles;  ///< in its own node numbers
   std::vector<std::array<Index, 2>> outline;    ///< in the plane: boundary edges
-  std::vector<std::uint8_t> materials;          ///< [t] as in Scene
+  std::vector<std::uint8_t> materials;          ///< [t] see Scene
 };
 
 /// Builds the scene of a body. Throws Error if the model's surface is not that of its mesh.

@@ -40,8 +40,8 @@ struct ServedAddress {
   std::string token;           ///< 128 random bits as hexadecimal digits
   std::filesystem::path book;  ///< empty if there is none
   std::size_t runs = 1;        ///< number of runs shown, 1 or 2
-  bool framed = false;         ///< as in ViewerOptions
-  int told = -1;               ///< as in ViewerOptions
+  bool framed = false;         ///< see ViewerOptions
+  int told = -1;               ///< see ViewerOptions
 };
 
 /// Bound port of a viewer, so that later steps cannot fail because of it. A client that connects waits until

@@ -77,7 +77,7 @@ struct ContactProblem {
   std::vector<Index> owner;        ///< [contacts] contact to which a held row belongs, else -1
   std::vector<double> W;           ///< [rows x stride] [m/N]
   LargeVector<float> body_W;       ///< [rows x single_stride] many contacts: compliance of the body [m/N]
-  LargeVector<float> single_W;     ///< [rows x single_stride] the same with the couplings [m/N]
+  LargeVector<float> single_W;     ///< [rows x single_stride] many contacts: the body and couplings [m/N]
   std::vector<double> b;           ///< [rows] [m]; many contacts: r for the guess
   std::vector<double> lambda;      ///< [rows] [N]; before solving: the guess
   std::vector<double> guess;       ///< [rows] lambda before solving [N]

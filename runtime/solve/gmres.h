@@ -42,7 +42,7 @@ class Gmres {
   std::ptrdiff_t stride_;
   int most_steps_;
   std::ptrdiff_t rows_ = 0;
-  int limit_ = 0;  // of steps
+  int limit_ = 0;  // limit of steps
   int steps_ = 0;
   float tolerance_ = 0.0F;
   bool done_ = true;

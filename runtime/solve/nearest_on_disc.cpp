@@ -16,7 +16,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 // Limit of Newton steps, each of which at least halves the step or the bracket.
 constexpr int most_steps = 80;
 
-/// Point that moves from a (share 0) to b (share 1), relative to the disc.
+/// Point that moves from a (parameter 0) to b (parameter 1), relative to the disc.
 class Runner {
  public:
   Runner(const Disc& disc, const Vec3& a, const Vec3& b) noexcept : radius_(disc.radius) {
@@ -33,8 +33,8 @@ class Runner {
     double rate;
   };
 
-  /// Half of the derivative of the squared distance with respect to the share, which is monotonic, and its
-  /// own derivative.
+  /// Half of the derivative of the squared distance with respect to the parameter, which is monotonic, and
+  /// its own derivative.
   [[nodiscard]] Slope slope(double share) const noexcept {
     Slope slope{(height_ + share * rise_) * rise_, rise_ * rise_};
     const Vec3 offset = offset_ + share * drift_;
@@ -71,9 +71,9 @@ class Runner {
 
  private:
   double radius_;
-  double height_;  // above the disc's plane at share 0
+  double height_;  // above the disc's plane at parameter 0
   double rise_;
-  Vec3 offset_;  // from the axis at share 0
+  Vec3 offset_;  // from the axis at parameter 0
   Vec3 drift_;
 };
 

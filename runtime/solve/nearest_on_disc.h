@@ -26,7 +26,7 @@ NearestPoint nearest_of_disc_and_line(const Disc& disc, const Vec3& a, const Vec
 NearestPoint nearest_of_disc_and_triangle(const Disc& disc, const Vec3& a, const Vec3& b,
                                           const Vec3& c) noexcept;
 
-/// Shares of line a b, ascending, at which it crosses the disc's rim as seen along the axis; they may lie
+/// Parameters of line a b, ascending, at which it crosses the disc's rim as seen along the axis; they may lie
 /// outside 0 to 1. NaN if it passes beside the disc or is parallel to the axis.
 std::array<double, 2> shares_over_rim(const Disc& disc, const Vec3& a, const Vec3& b) noexcept;
 

@@ -242,7 +242,7 @@ Vec3 NewtonKrylov::slipping_force(const Contact& contact, const Vec3& f, const V
     double slope =
         -e.dot(motion) + normal_change * across.dot(moved) + normal * contact.mu * across.dot(turned);
     if (!(slope > 0.0)) slope = scale;
-    const double half = 0.5 * std::clamp(-wrong / slope, -0.5, 0.5);  // of the angle, by its tangent
+    const double half = 0.5 * std::clamp(-wrong / slope, -0.5, 0.5);  // half the angle, by its tangent
     e = ((1.0 - half * half) * e + 2.0 * half * across) / (1.0 + half * half);
   }
   return force;

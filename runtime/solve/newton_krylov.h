@@ -46,7 +46,7 @@ class NewtonKrylov {
   [[nodiscard]] int rounds() const noexcept { return rounds_; }      ///< rounds of the last `solve`
   [[nodiscard]] double residual() const noexcept {
     return residual_;
-  }  ///< of the last `solve` [largest force]
+  }  ///< residual of the last `solve` [largest force]
   /// True if `solve` left time for another pass.
   [[nodiscard]] bool was_easy() const noexcept;
   /// r [rows] at the end of the last `solve` [m].
@@ -60,7 +60,7 @@ class NewtonKrylov {
   struct Contact {
     Index first = 0;  // row
     int rows = 0;
-    Index owner = -1;  // of a held row
+    Index owner = -1;  // contact of a held row
     Kind kind = Kind::held;
     Mode mode = Mode::open;
     double mu = 0.0;
@@ -125,7 +125,7 @@ class NewtonKrylov {
   std::vector<double> f_,
       best_f_;  // [rows] forces: the sum of single-precision changes; those of the smallest residual
   std::vector<float> r_, best_r_;          // [rows] motion
-  std::vector<double> few_b_, few_guess_;  // [rows] of a problem of few contacts
+  std::vector<double> few_b_, few_guess_;  // [rows] for a problem of few contacts
   std::vector<float> change_, product_;
   std::ptrdiff_t padded_rows_ = 0;
   std::vector<Reduced> reduced_;  // [max_contacts] the first active_ are used

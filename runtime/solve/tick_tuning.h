@@ -36,7 +36,7 @@ struct DetectionTuning {
                               ///< face is steeper to the disc, otherwise at eight places. Measured for a disc
                               ///< of two edges: nearest points of faces at 0.12 to 0.15 jumped back and forth
                               ///< by 0.3 %
-  double still_steep = 0.15;  ///< [sin] the same for a face touched in this way in the last tick
+  double still_steep = 0.15;  ///< [sin] threshold for a face touched in this way in the last tick
   double rim_apart = 0.1;     ///< [edge of the simplex] the crossing of an edge and a disc's rim is a contact
                               ///< point of its own if it is this far from the nearest point of the two
   double ahead = 0.05;        ///< [edge] beyond a tool's reach, within which one node per tick becomes near
@@ -183,9 +183,9 @@ struct BodyTuning {
 
 /// Placement of overlays.
 struct PatchTuning {
-  double clearly_more = 0.1;     ///< [1] of all weights, by which another node must exceed the centre
+  double clearly_more = 0.1;     ///< [1] lead over the centre that another node needs, of all weights
   double near_edges = 3.0;       ///< [edge of the body's mesh] a free tool nearer than this has an overlay
-  double smoothing = 0.05;       ///< [1/tick] of the tool's velocity
+  double smoothing = 0.05;       ///< [1/tick] smoothing of the tool's velocity
   std::int64_t look_stride = 8;  ///< ticks between searches around a free tool
   std::array<double, 4> times_ahead = {15.0, 40.0, 80.0, 150.0};  ///< [ticks] for which patches are requested
 };

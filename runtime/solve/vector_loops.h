@@ -27,7 +27,7 @@ void add(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff
 template <typename Real>
 void add_three(const Real* __restrict x, std::ptrdiff_t stride, const Real* factors, Real* __restrict y,
                std::ptrdiff_t count) noexcept {
-  constexpr auto line = static_cast<std::ptrdiff_t>(64 / sizeof(Real));  // of the cache
+  constexpr auto line = static_cast<std::ptrdiff_t>(64 / sizeof(Real));  // entries per cache line
   const Real f0 = factors[0], f1 = factors[1], f2 = factors[2];
   std::ptrdiff_t begin = 0;
   for (; begin + line <= count; begin += line) {

@@ -40,8 +40,8 @@ class BodyCompliance {
   [[nodiscard]] Index renewed() const noexcept { return renewed_; }
 
  private:
-  /// Number of entries of a row of J: d at each of three nodes. Entry t of row i is stored at t rows + i, so
-  /// that all rows are processed at once.
+  /// Largest number of entries of a row of J: d at each of three nodes. Entry t of row i is stored at t rows
+  /// + i, so that all rows are processed at once.
   static constexpr int most_entries = 9;
 
   bool enter(const NearField& near, const ContactRow& row, Index i) noexcept;
@@ -58,7 +58,7 @@ class BodyCompliance {
   std::vector<float> response_;       // [near dofs] column of Xi J^T [m/N]
   Index kept_rows_ = 0;
   Index renewed_ = 0;
-  std::int64_t revision_ = -1;  // of the near field
+  std::int64_t revision_ = -1;  // revision of the near field
 };
 
 }  // namespace palpate

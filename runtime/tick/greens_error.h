@@ -20,7 +20,7 @@ struct GreensErrorScratch {
 
   std::optional<ErrorBound> bound;  ///< empty if the Green's functions are not compressed
   std::vector<double> near_force;   ///< [d near nodes] change by a motion of the tool [N/m]
-  NodalLoad stored_force;           ///< the same on stored nodes
+  NodalLoad stored_force;           ///< near_force on stored nodes
 };
 
 /// Stores the forces of a tick.

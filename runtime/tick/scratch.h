@@ -23,8 +23,8 @@ namespace palpate {
 
 /// Largest use of each fixed capacity by a tick.
 struct HighWater {
-  Index near_nodes = 0;      ///< of NearField::capacity
-  Index contact_points = 0;  ///< of State::max_contacts
+  Index near_nodes = 0;      ///< limit: NearField::capacity
+  Index contact_points = 0;  ///< limit: State::max_contacts
   Index unknowns = 0;        ///< rows of the contact problem, of Scratch::rows
   Index simplices = 0;       ///< near a tool, of DetectionScratch::pairs; if larger, not all were examined
 };
@@ -108,7 +108,7 @@ struct AssemblyScratch {
   std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] from `linearise` with many contacts: change of
                                           ///< the force by a motion of the tool's device, one column per axis
                                           ///< [N/m]
-  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] those of the last tick or pass
+  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] response of the last tick or pass
   Index response_count = 0;
   BodyCompliance compliance;        ///< many contacts: compliance of the body
   std::vector<float> coupling;      ///< [6 x rows] many contacts: forces and moments

@@ -23,10 +23,10 @@ struct ToolState {
   Tool tool;
   ToolPose device;        ///< device pose used by the tick: the last finite one, approached at bounded speed
   ToolPose pose;          ///< pose of the tool itself, outside the body: `device` plus the coupling's stretch
-  Wrench contact_wrench;  ///< of the contacts on the tool, about its origin
+  Wrench contact_wrench;  ///< contacts on the tool, about its origin
   Wrench wrench;          ///< on the hand, about the tool's origin: to be displayed by the device
   LocalModel local;       ///< linearisation of wrench.force
-  Wrench last_contact_wrench;          ///< of the last tick or pass
+  Wrench last_contact_wrench;          ///< contact_wrench of the last tick or pass
   Vec3 last_force = Vec3::Zero();      ///< contact_wrench.force of the last tick [N]
   Vec3 last_change = Vec3::Zero();     ///< change of contact_wrench.force in the last tick [N]
   ToolPose last_device;                ///< device pose of the last tick
@@ -48,7 +48,7 @@ struct ToolState {
   bool holding = false;         ///< a grab holds the surface
   bool touched_last_tick = false;      ///< had closed contact points
   bool held_last_tick = false;         ///< a grab held the surface
-  StepStatus status = StepStatus::ok;  ///< of the last tick
+  StepStatus status = StepStatus::ok;  ///< status of the last tick
 };
 
 /// Location of a run of stored nodes (Body::runs): with near nodes, beside such a run, or far.
@@ -62,7 +62,7 @@ struct FarSweep {
   Index next_node = 0;           ///< stored node at which the sweep of the whole body continues
   Index next_patch_node = 0;     ///< place in the patch at which it continues there
   double change = 0.0;           ///< largest displacement of a node in this sweep [m]
-  double last_change = 0.0;      ///< the same for the previous sweep: possible error of a far node [m]
+  double last_change = 0.0;      ///< change of the previous sweep: possible error of a far node [m]
   std::vector<Index> near_runs;  ///< [Body::runs] runs that are updated more often, in order
   Index near_run_count = 0;      ///< number of these
   Index next_near_run = 0;       ///< place in near_runs at which the next tick continues
@@ -110,7 +110,7 @@ struct State {
   std::int64_t ticks = 0;        ///< number of ticks so far
   std::int64_t still_ticks = 0;  ///< ticks since a device, the body itself or its overlay moved or changed
   bool goes_half_way = false;    ///< the last tick made only half of its change of forces
-  StepStatus status = StepStatus::ok;  ///< of the last tick, for all tools
+  StepStatus status = StepStatus::ok;  ///< status of the last tick, for all tools
   std::vector<ToolState> tools;
   std::vector<ContactPoint> contact_points;  ///< [max_contacts] held ones first
   Index contact_count = 0;

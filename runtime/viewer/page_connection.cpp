@@ -23,9 +23,9 @@ constexpr auto request_time = 10s;                       // to receive a header
 constexpr auto response_time = 30s;                      // for the client to read an answer
 constexpr auto idle_time = 30s;                          // a ping is sent after half of it
 constexpr auto stall_time = 10s;                         // for the page to read a message
-constexpr std::size_t most_unread = 32U << 20U;          // [bytes] of queued texts
+constexpr std::size_t most_unread = 32U << 20U;          // [bytes] queued texts
 constexpr int send_buffer = 256 << 10;                   // small, so that a slow page sees recent pictures
-constexpr std::int64_t nanoseconds_per_byte = 1000 / 6;  // of pictures: 6 MB/s
+constexpr std::int64_t nanoseconds_per_byte = 1000 / 6;  // pictures at 6 MB/s
 constexpr std::size_t longest_reason = 120;              // bytes that fit into a closing frame
 
 }  // namespace

@@ -20,7 +20,7 @@ struct Ask {
   void operator()(const RecordWord& word) const { run.record(word.on); }
   void operator()(const ControlWord&) const {}  // between pages
   void operator()(const SeekWord& word) const { run.seek(word.frame); }
-  void operator()(const FollowWord&) const {}  // of the page alone
+  void operator()(const FollowWord&) const {}  // for the page alone
 };
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-struct hid_device_;  // of hidapi
+struct hid_device_;  // declared by hidapi
 
 namespace palpate {
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t longest_input = 64;           // bytes of a full-speed interrupt transfer
 constexpr int most_drained = 64;                    // Linux queues as many reports
-constexpr std::int64_t longest_write = 20'000'000;  // of a working device [ns]
+constexpr std::int64_t longest_write = 20'000'000;  // limit for a working device [ns]
 
 }  // namespace
 

@@ -79,7 +79,7 @@ struct BoardFeature {
 /// Force in the board's unit, and the fraction of the request that it amounts to.
 struct BoardCounts {
   std::array<std::int16_t, 3> counts{};
-  double shown = 1.0;  ///< as in Saturated
+  double shown = 1.0;  ///< see Saturated
 };
 [[nodiscard]] BoardCounts board_counts(const BoardFeature& feature, const Vec3& force) noexcept;
 

@@ -75,7 +75,7 @@ struct PidBlockLoad {
 /// not displayed.
 struct PidForce {
   std::array<double, pid_axes> parts{};
-  double shown = 1.0;  ///< as in Saturated, for the components in the plane
+  double shown = 1.0;  ///< see Saturated; for the components in the plane
 };
 [[nodiscard]] PidForce pid_force(const PidConstants& constants, const Vec3& force) noexcept;
 

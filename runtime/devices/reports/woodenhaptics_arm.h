@@ -20,9 +20,9 @@ struct ArmConstants {
   Vec3 lengths = Vec3::Zero();                ///< height of b's joint over the ground, lengths of b and c [m]
   Vec3 capstan_diameters = Vec3::Zero();      ///< [m]
   Vec3 body_diameters = Vec3::Zero();         ///< diameters of the bodies driven by the capstans [m]
-  Vec3 torque_constants = Vec3::Zero();       ///< of the motors [N m/A]
+  Vec3 torque_constants = Vec3::Zero();       ///< motors [N m/A]
   double max_current = 0.0;                   ///< largest current of one motor [A]
-  std::array<double, 6> counts_per_turn{};    ///< of encoders A..F (four per line); D..F 0: no wrist
+  std::array<double, 6> counts_per_turn{};    ///< encoders A..F (four per line); D..F 0: no wrist
   std::array<bool, 3> motor_aligned{};        ///< A..C: the motor points along the joint's axis
   std::array<bool, 3> encoder_aligned{};      ///< D..F: counts increase with the joint's angle
   std::array<std::int16_t, 6> calibration{};  ///< counters a..f in the calibration pose
