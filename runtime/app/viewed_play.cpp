@@ -188,7 +188,7 @@ void ViewedPlay::load(const Settings& settings) {
   show_body();
 }
 
-/// Tells the pages the reason for a delay.
+/// Shows the reason for a delay in the pages.
 void ViewedPlay::begin_making(const char* what) {
   const std::lock_guard lock(mutex_);
   state_.busy = what;

@@ -11,8 +11,8 @@
 namespace palpate {
 
 /// Latest picture, and the latest one whose surface is sent: at most 30 per second of the run's time.
-/// Messages are encoded when the first client needs them. Counters tell a client whether it has received the
-/// latest. For the server's thread.
+/// Messages are encoded when the first client needs them. By its counters a client knows whether it has
+/// received the latest. For the server's thread.
 class IgtlBroadcast {
  public:
   using Clock = std::chrono::steady_clock;

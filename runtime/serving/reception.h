@@ -33,7 +33,7 @@ class Received {
 
 /// Accepts connections and bounds their number. Few may be without the token, and they give way: at the limit
 /// the oldest of them is closed. A client without the token therefore cannot keep out one with it. Clients
-/// with the token belong to this user and are told when there are too many. For use by one thread.
+/// with the token belong to this user and get an answer if there are too many. For use by one thread.
 class Reception {
  public:
   using Receive = std::function<std::shared_ptr<Received>(boost::asio::ip::tcp::socket)>;

@@ -107,8 +107,8 @@ void Imbalance::choose_mode(const ContactProblem& problem, Index contact) noexce
   set_contact(problem, contact, to - f, change_);
 }
 
-/// Reduces the motion to what the contact's equations forbid: all of it if it sticks; the normal part if it
-/// slips, which is corrected along the edge of the cone.
+/// Keeps the part of the motion that violates the contact's equations: all of it if it sticks; the normal
+/// part if it slips, which is corrected along the edge of the cone.
 void Imbalance::keep_equations(const ContactProblem& problem, Index contact) noexcept {
   if (mode_[contact] == Mode::stick) return;
   Vec3 left = Vec3::Zero();

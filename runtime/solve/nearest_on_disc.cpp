@@ -49,7 +49,7 @@ class Runner {
     return slope;
   }
 
-  /// True if the line passes through the disc; then also its share.
+  /// True if the line passes through the disc; then also the parameter.
   bool cuts(double& share) const noexcept {
     const double end = height_ + rise_;
     if (!((height_ > 0.0 && end < 0.0) || (height_ < 0.0 && end > 0.0))) return false;

@@ -24,8 +24,8 @@ struct Message {
 };
 Message text_message(std::string text);
 
-/// Content of the pages, encoded when the first page needs it. Counters tell a page whether it has received
-/// the latest. For the server's thread.
+/// Content of the pages, encoded when the first page needs it. By its counters a page knows whether it has
+/// received the latest. For the server's thread.
 class Broadcast {
  public:
   void set_scene(std::shared_ptr<const Scene> scene);
