@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "formats/condensed_patch.h"
-#include "formats/newmark.h"
-#include "formats/packed.h"
+#include "matrices/newmark.h"
+#include "matrices/packed.h"
 #include "meshes/material.h"
 #include "meshes/mesh.h"
 #include "meshes/quality.h"
@@ -71,13 +71,6 @@ struct StoredOverlay {
   int rings = 0;                        ///< of elements around the centres
   std::vector<Index> centres;           ///< [P] mesh nodes on the surface, ascending
   std::vector<CondensedPatch> patches;  ///< [P]
-};
-
-/// Method for the body's dynamics.
-enum class DynamicsMethod : std::uint8_t {
-  none,    ///< no dynamics in the file
-  packed,  ///< all stored dofs by the packed inverse of K_bar = K + a0 M + a1 C_d; scope full
-  modal,   ///< lowest modes
 };
 
 /// A symmetric sparse matrix pair of the stored dofs by columns of the lower triangle.

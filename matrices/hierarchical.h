@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -1,7 +1,7 @@
 // Ranges of nodes.
 #pragma once
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -8,14 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "base/vectors.h"
 #include "meshes/element_type.h"
 
 namespace palpate {
-
-using Vec3 = Eigen::Vector3d;
-using Mat3 = Eigen::Matrix3d;
-using Index =
-    std::int32_t;  ///< node, element and facet numbers; counts of bytes and matrix entries are std::int64_t
 
 using Triangle = std::array<Index, 3>;  ///< node numbers, counter-clockwise seen from outside the body
 

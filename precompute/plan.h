@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/journal.h"
-#include "formats/packed.h"
+#include "matrices/packed.h"
 #include "precompute/numerics/greens_solver.h"
 
 namespace palpate {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/newmark.h"
+#include "matrices/newmark.h"
 #include "meshes/material.h"
 #include "meshes/mesh.h"
 #include "statics/live_law.h"

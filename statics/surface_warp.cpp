@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "statics/polar.h"
 #include "statics/rotation_vector.h"
 

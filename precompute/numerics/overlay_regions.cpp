@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "base/error.h"
-#include "formats/packed.h"
+#include "matrices/packed.h"
 #include "meshes/selection.h"
 #include "overlay/condensation.h"
 #include "overlay/patch_mesh.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "formats/packed.h"
+#include "matrices/packed.h"
 #include "precompute/numerics/factor.h"
 
 namespace palpate {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "statics/balance.h"
 #include "statics/live_forces.h"
 #include "statics/polar.h"

@@ -5,7 +5,7 @@
 
 #include "runtime/app/play_options.h"
 #include "runtime/body/body.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "base/vectors.h"
 #include "base/write_file.h"
-#include "meshes/node_vectors.h"
 #include "meshes/readers/vtu_writer.h"
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/surface_numbering.h"

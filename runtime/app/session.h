@@ -10,7 +10,7 @@
 #include "runtime/loop/best_effort.h"
 #include "runtime/loop/histogram.h"
 #include "runtime/safety/fault.h"
-#include "runtime/tick/status.h"
+#include "runtime/core/tick/status.h"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 
 #include "meshes/element.h"
 #include "runtime/body/overlay.h"
-#include "runtime/body/patch.h"
+#include "runtime/core/body/patch.h"
 #include "statics/live_forces.h"
 
 namespace palpate {
@@ -235,7 +235,7 @@ std::shared_ptr<const Patch> HyperelasticPatch::linearise() {
   const Eigen::Index d = body_.dimension();
   for (Eigen::Index dof = 0; dof < offset.surface.size(); ++dof)
     offset.surface[dof] += u[d * condensed.surface[static_cast<std::size_t>(dof / d)] + dof % d];
-  return std::make_shared<const Patch>(body_, mesh_, condensed, offset);
+  return make_patch(body_, mesh_, condensed, offset);
 }
 
 }  // namespace palpate

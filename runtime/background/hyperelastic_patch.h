@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "overlay/tangent_condensation.h"
-#include "runtime/body/patch.h"
+#include "runtime/body/make_patch.h"
 #include "statics/live_body.h"
 
 namespace palpate {

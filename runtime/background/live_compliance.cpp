@@ -126,8 +126,8 @@ bool LiveCompliance::go_on(const LiveState& state, double error) {
 void LiveCompliance::deliver(const PackedGreens& W, const Mat3& Q) {
   const int d = live_.dimension();
   R_delivered_ = now_.R;
-  renewed_ = std::make_shared<const Greens>(turns_with_body_ ? turned(W, Q, d) : W, d,
-                                            GreensOptions{.jobs = 1, .max_square_bytes = -1});
+  renewed_ = make_greens(turns_with_body_ ? turned(W, Q, d) : W, d,
+                         GreensOptions{.jobs = 1, .max_square_bytes = -1});
   std::erase_if(kept_, [](const auto& old) { return old.use_count() == 1; });
   kept_.push_back(renewed_);
 }

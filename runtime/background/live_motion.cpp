@@ -7,7 +7,7 @@
 #include <numeric>
 #include <span>
 
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "runtime/live/live_model.h"
 #include "statics/polar.h"
 

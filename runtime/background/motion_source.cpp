@@ -6,7 +6,7 @@
 #include "runtime/background/live_motion.h"
 #include "runtime/background/packed_motion.h"
 #include "runtime/background/warped_motion.h"
-#include "runtime/tick/surface_motion.h"
+#include "runtime/core/tick/surface_motion.h"
 
 namespace palpate {
 namespace {

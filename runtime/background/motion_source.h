@@ -10,7 +10,8 @@
 
 #include "base/latest.h"
 #include "runtime/background/motion_stepper.h"
-#include "runtime/tick/state.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/body/free_motion.h"
+#include "runtime/core/body/free_motion.h"
 
 namespace palpate {
 

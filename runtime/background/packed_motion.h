@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/background/motion_stepper.h"
+#include "runtime/body/body.h"
 #include "runtime/body/packed_newmark.h"
 
 namespace palpate {

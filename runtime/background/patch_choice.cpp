@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "runtime/solve/tick_tuning.h"
-#include "runtime/touch/tool_geometry.h"
+#include "runtime/core/solve/tick_tuning.h"
+#include "runtime/core/touch/tool_geometry.h"
 
 namespace palpate {
 namespace {

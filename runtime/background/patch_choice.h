@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "runtime/body/patch_maker.h"
-#include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/state.h"
+#include "runtime/core/solve/tick_tuning.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

@@ -201,8 +201,7 @@ bool PatchSource::build_stored() {
   while (next_stored_ < overlay.centres.size()) {
     const Index centre = body_.stored_node(overlay.centres[next_stored_]);
     const CondensedPatch* condensed = centre >= 0 ? maker_.stored(centre) : nullptr;
-    if (condensed == nullptr || free_slots_.empty() ||
-        bytes_ + Patch::bytes_of(*condensed) > options_.memory) {
+    if (condensed == nullptr || free_slots_.empty() || bytes_ + bytes_of(*condensed) > options_.memory) {
       next_stored_ = overlay.centres.size();
       break;
     }

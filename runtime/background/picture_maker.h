@@ -7,8 +7,8 @@
 #include "formats/recording.h"
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/body.h"
-#include "runtime/body/free_motion.h"
-#include "runtime/body/surface_load.h"
+#include "runtime/core/body/free_motion.h"
+#include "runtime/core/body/surface_load.h"
 
 namespace palpate {
 

@@ -1,6 +1,6 @@
 #include "runtime/background/seen_contact.h"
 
-#include "runtime/touch/contact_nodes.h"
+#include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {

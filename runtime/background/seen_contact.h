@@ -1,7 +1,8 @@
 // Contact point for display.
 #pragma once
 
-#include "runtime/tick/state.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

@@ -4,10 +4,10 @@
 
 #include <chrono>
 
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "runtime/background/element_stress.h"
-#include "runtime/body/surface_load.h"
-#include "runtime/touch/contact_nodes.h"
+#include "runtime/core/body/surface_load.h"
+#include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {

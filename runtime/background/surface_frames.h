@@ -14,8 +14,8 @@
 #include "formats/recording.h"
 #include "runtime/background/picture_maker.h"
 #include "runtime/background/seen_contact.h"
-#include "runtime/body/free_motion.h"
-#include "runtime/tick/state.h"
+#include "runtime/core/body/free_motion.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

@@ -10,7 +10,7 @@
 #include "runtime/background/side_tractions.h"
 #include "runtime/background/stress_rows.h"
 #include "runtime/body/body.h"
-#include "runtime/body/patch.h"
+#include "runtime/core/body/patch.h"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 #include <exception>
 #include <numeric>
 
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 
 namespace palpate {
 namespace {
@@ -109,7 +109,7 @@ std::vector<double> WarpedMotion::spread(const MotionJob& job, int axis) const {
 }
 
 void WarpedMotion::turn_compliance(const MotionJob& job) {
-  Greens turned = body_.greens().turned(R_);
+  turned_ = turned(body_.shared_greens(), R_);
   if (!job.load.empty()) {
     const int d = body_.dimension();
     // Distributed forces, the body's displacement by them, and that by rotated blocks alone.
@@ -125,15 +125,14 @@ void WarpedMotion::turn_compliance(const MotionJob& job) {
       P.col(axis) = column(p);
       balance_.respond_to(p, moved);
       S.col(axis) = column(moved);
-      turned.displacement(nodes, p, moved);
+      turned_->displacement(nodes, p, moved);
       T.col(axis) = column(moved);
     }
     Eigen::MatrixXd left(P.rows(), 2 * d), right(P.rows(), 2 * d);
     left << S * inverse_of(S.transpose() * P), -T * inverse_of(T.transpose() * P);
     right << S, T;
-    turned = body_.greens().turned(R_, left, right);
+    turned_ = turned(body_.shared_greens(), R_, left, right);
   }
-  turned_ = std::make_shared<const Greens>(std::move(turned));
   R_turned_ = R_;
   std::erase_if(kept_, [](const auto& old) { return old.use_count() == 1; });
   kept_.push_back(turned_);

@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "matrices/sparse_cholesky.h"
 #include "meshes/element.h"
-#include "runtime/body/patch.h"
+#include "runtime/body/make_patch.h"
 
 namespace palpate {
 namespace {

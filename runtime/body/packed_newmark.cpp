@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "runtime/solve/vector_loops.h"
+#include "runtime/core/solve/vector_loops.h"
 
 namespace palpate {
 namespace {

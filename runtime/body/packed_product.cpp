@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "runtime/solve/vector_loops.h"
+#include "runtime/core/solve/vector_loops.h"
 
 namespace palpate {
 namespace {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "formats/packed.h"
+#include "matrices/packed.h"
 
 namespace palpate {
 

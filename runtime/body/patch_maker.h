@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "runtime/body/patch.h"
+#include "runtime/body/make_patch.h"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 
 namespace palpate {
 namespace {

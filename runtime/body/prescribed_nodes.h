@@ -7,7 +7,7 @@
 
 #include "runtime/body/body.h"
 #include "runtime/body/overlay.h"
-#include "runtime/solve/capacitance.h"
+#include "runtime/core/solve/capacitance.h"
 
 namespace palpate {
 

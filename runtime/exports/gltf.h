@@ -8,7 +8,7 @@
 #include "base/write_file.h"
 #include "formats/recording.h"
 #include "runtime/background/surface_frames.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

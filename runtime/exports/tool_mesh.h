@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

@@ -15,8 +15,8 @@
 
 #include "base/error.h"
 #include "base/latest.h"
+#include "base/vectors.h"
 #include "formats/model_file.h"
-#include "meshes/node_vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/seen_contact.h"
@@ -30,7 +30,7 @@
 #include "runtime/loop/loading.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/monotonic_clock.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate {
 namespace {

@@ -8,7 +8,7 @@
 #include "runtime/background/surface_frames.h"
 #include "runtime/loop/recorder.h"
 #include "runtime/loop/settings.h"
-#include "runtime/tick/state.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

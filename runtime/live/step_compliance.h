@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/packed.h"
+#include "matrices/packed.h"
 #include "runtime/live/live_stepper.h"
 
 namespace palpate {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "runtime/live/walls.h"
-#include "runtime/solve/cone_solver.h"
-#include "runtime/solve/contact_problem.h"
+#include "runtime/core/solve/cone_solver.h"
+#include "runtime/core/solve/contact_problem.h"
 #include "statics/live_body.h"
 #include "statics/tangent_solver.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "runtime/tick/status.h"
+#include "runtime/core/tick/status.h"
 
 namespace palpate {
 

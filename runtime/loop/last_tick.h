@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "runtime/tick/state.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

@@ -16,6 +16,7 @@
 #include "base/regular_file.h"
 #include "formats/model_check.h"
 #include "formats/model_file.h"
+#include "matrices/hierarchical.h"
 #include "runtime/body/scaled_model.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
@@ -33,13 +34,14 @@ void warn_once(const std::string& text) {
 }
 
 void print_loaded(const Body& body, double seconds) {
-  const std::string stored = body.greens().compressed()
-                                 ? fmt::format("compressed to {:.1f} MB",
-                                               1e-6 * static_cast<double>(body.greens().compressed_bytes()))
-                                 : fmt::format("in {} precision", name_of(body.greens().precision()));
+  const HierarchicalMatrix* compressed = body.greens().compressed_form();
+  const std::string stored =
+      compressed != nullptr
+          ? fmt::format("compressed to {:.1f} MB", 1e-6 * static_cast<double>(compressed->bytes()))
+          : fmt::format("in {} precision", name_of(body.greens().precision()));
   say(stderr, "{}: {} free surface nodes, {} dofs {}, loaded in {:.2f} s\n", body.model().name,
       body.free_surface_nodes().size(), body.greens().order(), stored, seconds);
-  if (!body.greens().unfolded() && !body.greens().compressed()) {
+  if (!body.greens().unfolded() && compressed == nullptr) {
     print_warning(
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
         "is slower");

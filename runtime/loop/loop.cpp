@@ -8,7 +8,7 @@
 #include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/tick_record.h"
 #include "runtime/safety/monotonic_clock.h"
-#include "runtime/touch/contact_nodes.h"
+#include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {

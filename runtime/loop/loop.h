@@ -15,7 +15,7 @@
 #include "runtime/safety/device.h"
 #include "runtime/safety/safety.h"
 #include "runtime/safety/workspace.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include "runtime/loop/histogram.h"
 #include "runtime/loop/replay_device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/tick/status.h"
+#include "runtime/core/tick/status.h"
 
 namespace palpate {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "runtime/body/body.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

@@ -12,7 +12,7 @@
 #include "runtime/loop/histogram.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/tick/status.h"
+#include "runtime/core/tick/status.h"
 
 namespace palpate {
 

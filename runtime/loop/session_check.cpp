@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/tick/status.h"
+#include "runtime/core/tick/status.h"
 
 namespace palpate {
 namespace {

@@ -15,7 +15,7 @@
 #include "runtime/loop/loading.h"
 #include "runtime/safety/safety_options.h"
 #include "runtime/safety/workspace.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

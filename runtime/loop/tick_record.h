@@ -3,7 +3,7 @@
 
 #include "formats/recording.h"
 #include "runtime/body/body.h"
-#include "runtime/tick/state.h"
+#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

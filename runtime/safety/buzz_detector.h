@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

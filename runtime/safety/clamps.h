@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

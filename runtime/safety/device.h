@@ -6,8 +6,8 @@
 #include <limits>
 #include <optional>
 
-#include "runtime/tick/local_model.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/tick/local_model.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

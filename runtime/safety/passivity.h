@@ -1,7 +1,7 @@
 // Observer of the energy given to the hand, and the damping that takes it back.
 #pragma once
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -1,7 +1,7 @@
 // Tool pose requested by a pointer on a screen.
 #pragma once
 
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

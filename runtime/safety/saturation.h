@@ -1,7 +1,7 @@
 // Saturation of a command at the limit of a device.
 #pragma once
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -1,7 +1,7 @@
 // Stiffness limits of a device.
 #pragma once
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
-#include "runtime/body/patch.h"
+#include "runtime/core/body/patch.h"
 #include "runtime/scene/inner_surface.h"
 
 namespace palpate {

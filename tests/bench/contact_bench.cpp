@@ -28,7 +28,7 @@
 #include "precompute/bake.h"
 #include "precompute/description/read_description.h"
 #include "precompute/numerics/factor.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/bench/palpation_paths.h"
 #include "tests/bench/tick_stages.h"
 

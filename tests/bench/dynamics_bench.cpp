@@ -43,9 +43,10 @@
 #include "precompute/bake.h"
 #include "precompute/description/read_description.h"
 #include "precompute/numerics/dynamics.h"
-#include "runtime/body/modal_newmark.h"
+#include "runtime/body/body.h"
 #include "runtime/body/packed_newmark.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/body/modal_newmark.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate {
 namespace {
@@ -335,7 +336,7 @@ void keep_modes(Model& model, Index count) {
 void time_modal(benchmark::State& run, Model model, Index count, bool seen) {
   if (model.dynamics.modes() < count) return run.SkipWithError("the file has fewer modes");
   keep_modes(model, count);
-  const Modes modes(model);
+  const Modes modes(model.dimension(), model.dynamics.omega, model.dynamics.shapes);
   const std::vector<Index> nodes = surface_nodes(model);
   std::vector<Vec3> u(nodes.size());
   const std::vector<double> g(static_cast<std::size_t>(count), 1.0), rate(g.size());

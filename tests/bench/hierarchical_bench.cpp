@@ -36,7 +36,7 @@
 #include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
-#include "runtime/body/greens.h"
+#include "runtime/core/body/greens.h"
 #include "tests/support/compression/clustered_body.h"
 #include "tests/support/folders.h"
 #include "tests/support/precompute_case.h"
@@ -91,8 +91,8 @@ Forms make_forms(const ElasticBody& body, const Surface& surface) {
   forms.points = stored.points;
   forms.compressed_bytes = matrix->bytes();
   forms.dense_bytes = 4 * matrix->order() * matrix->order();
-  forms.compressed = std::make_shared<const Greens>(std::move(matrix));
-  forms.dense = std::make_shared<const Greens>(solve_all(factor, stored.dofs), body.mesh.dimension());
+  forms.compressed = make_greens(std::move(matrix));
+  forms.dense = make_greens(solve_all(factor, stored.dofs), body.mesh.dimension());
   return forms;
 }
 
@@ -265,7 +265,7 @@ void new_node(benchmark::State& run, const Greens& greens, const std::vector<Arr
 void register_new_nodes(const std::filesystem::path& file) {
   const Model model = load_model(file);
   if (model.compressed == nullptr) throw Error("is not compressed", file.string(), "Give a compressed model");
-  const auto greens = std::make_shared<const Greens>(model.compressed);
+  const auto greens = make_greens(model.compressed);
   std::vector<Vec3> points;
   for (const Index node : model.stored_nodes)
     points.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);

@@ -39,9 +39,9 @@
 #include "formats/model_file.h"
 #include "precompute/bake.h"
 #include "precompute/description/read_description.h"
-#include "runtime/body/patch.h"
+#include "runtime/body/make_patch.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/folders.h"
 #include "tests/support/partitioned_inverse.h"
 
@@ -160,7 +160,7 @@ void time_patch(benchmark::State& run, const Touched& touched, int refinement, i
     }));
     CondensedPatch inner;
     condensed.push_back(seconds([&] { inner = condense(model, mesh); }));
-    rest.push_back(seconds([&] { patch = std::make_shared<const Patch>(body, mesh, inner); }));
+    rest.push_back(seconds([&] { patch = make_patch(body, mesh, inner); }));
     all.push_back(cut.back() + condensed.back() + rest.back());
     run.SetIterationTime(all.back());
     run.counters["local_dofs"] = static_cast<double>(mesh.free_dofs);

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "base/error.h"
-#include "runtime/tick/clearance.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/clearance.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate::test {
 namespace {

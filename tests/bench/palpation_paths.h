@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "runtime/body/body.h"
-#include "runtime/solve/surface_tree.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/solve/surface_tree.h"
+#include "runtime/core/touch/tool.h"
 
 namespace palpate::test {
 

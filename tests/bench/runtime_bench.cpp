@@ -227,7 +227,7 @@ void read_bandwidth(benchmark::State& run, std::int64_t order) {
 void unfold(benchmark::State& run, const PackedGreens& greens, int dimension) {
   Samples samples;
   while (run.KeepRunning())
-    samples.time(run, [&] { benchmark::DoNotOptimize(Greens(greens, dimension).order()); });
+    samples.time(run, [&] { benchmark::DoNotOptimize(make_greens(greens, dimension)->order()); });
   samples.report(run);
   run.counters["GB_per_s"] =
       1e-9 * static_cast<double>(greens.order() * greens.order() * bytes_per_scalar(greens.precision())) /

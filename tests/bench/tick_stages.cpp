@@ -2,10 +2,10 @@
 
 #include <chrono>
 
-#include "runtime/tick/assemble_contact.h"
-#include "runtime/tick/contact_detection.h"
-#include "runtime/tick/contact_solution.h"
-#include "runtime/tick/linearise.h"
+#include "runtime/core/tick/assemble_contact.h"
+#include "runtime/core/tick/contact_detection.h"
+#include "runtime/core/tick/contact_solution.h"
+#include "runtime/core/tick/linearise.h"
 
 namespace palpate::test {
 namespace {

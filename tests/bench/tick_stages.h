@@ -1,7 +1,8 @@
 // What the stages of a tick cost.
 #pragma once
 
-#include "runtime/tick/step.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate::test {
 

@@ -83,7 +83,7 @@ class Pages(unittest.TestCase):
 
     def test_each_status_fault_and_phase_has_a_row(self):
         named = []
-        for header in ("runtime/tick/status.h", "runtime/safety/fault.h"):
+        for header in ("runtime/core/tick/status.h", "runtime/safety/fault.h"):
             named += re.findall(r'^    \{\w+::(\w+), "\1"\}', (SOURCE / header).read_text(), re.MULTILINE)
         has = rows(page("status-bits"))
         self.assertEqual([row[-2].strip("`") for row in has], named)
@@ -91,7 +91,7 @@ class Pages(unittest.TestCase):
         self.assertIn(["8", "`stopped`", "emergency stop"], has)
 
     def test_each_tuned_number_has_a_row(self):
-        header = (SOURCE / "runtime/solve/tick_tuning.h").read_text()
+        header = (SOURCE / "runtime/core/solve/tick_tuning.h").read_text()
         members = re.findall(r"^  [^/\n]* = [^\n]*;|^  [^/\n]* =\n", header, re.MULTILINE)
         self.assertGreater(len(members), 90)
         self.assertEqual(len(rows(page("tuning"))), len(members))

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/newmark.h"
+#include "matrices/newmark.h"
 #include "precompute/numerics/assembly.h"
 
 namespace palpate::test {

@@ -44,7 +44,7 @@ class Rules(unittest.TestCase):
     def test_a_house_in_order_passes(self):
         status, said = self.check()
         self.assertEqual(status, 0, said)
-        self.assertIn("3 files, 0 rules broken", said)
+        self.assertIn("3 files, 5 lines, 0 rules broken", said)
 
     def test_an_include_upwards_is_refused(self):
         self.write("base/words.cpp", '#include "meshes/mesh.h"\n')
@@ -60,6 +60,15 @@ class Rules(unittest.TestCase):
         self.assertEqual(self.check()[0], 0)
         self.write("base/item.cpp", '#include "base/item.h"\n#include "base/list.h"\n')
         self.refused("base/item.cpp:2: base/item, base/list include each other in a circle")
+
+    def test_a_core_that_needs_a_library_is_refused(self):
+        self.write("runtime/core/tick/step.h", '#include <Eigen/Core>\n#include "base/error.h"\n')
+        self.write(".clang-tidy", "HeaderFilterRegex: '(base|meshes|runtime)/[a-z/]+\\.h$'\n")
+        self.write("docs/architecture.md", "| folder | library |\n|---|---|\n| `base` | x |\n| `runtime/core/tick` | z |\n| `meshes`, `scripts` | y |\n")
+        self.write("docs/pictures/house.svg", "<svg><title>meshes&#45;&gt;base</title><title>runtime/core/tick&#45;&gt;base</title></svg>")
+        self.assertEqual(self.check()[0], 0, self.check()[1])
+        self.write("base/error.cpp", "#include <string>\n#include <fmt/format.h>\n")
+        self.refused("base/error.cpp:2: includes <fmt/format.h>: runtime/core stands on it")
 
     def test_a_folder_of_forty_files_is_the_largest(self):
         for k in range(39):

@@ -15,7 +15,7 @@ from vtk.util.numpy_support import vtk_to_numpy
 from programs import PATIENCE, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
-HANDING_OVER = 1 << 10  # runtime/tick/status.h
+HANDING_OVER = 1 << 10  # runtime/core/tick/status.h
 STRESS_COLUMNS = ("sxx", "syy", "szz", "sxy", "syz", "szx")
 FIELD_COLUMNS = ("node", "x", "y", "z", "u0x", "u0y", "u0z", "ux", "uy", "uz", *STRESS_COLUMNS, "von_mises")
 

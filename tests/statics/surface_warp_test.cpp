@@ -145,14 +145,17 @@ TEST_P(SurfaceWarpOf, TurnedBlocksAreTurned) {
        {Precision::double_precision, Precision::single_precision, Precision::split_precision}) {
     const Model model = test::unit_model(d, 3, Scope::full, precision);
     for (const std::int64_t most_bytes : {std::int64_t{-1}, std::int64_t{0}}) {
-      const Greens greens(model.greens, d, {.jobs = 1, .max_square_bytes = most_bytes});
+      const std::shared_ptr<const Greens> made =
+          make_greens(model.greens, d, {.jobs = 1, .max_square_bytes = most_bytes});
+      const Greens& greens = *made;
       std::vector<Mat3> R;
       for (Index k = 0; k < greens.nodes(); ++k) {
         const Vec3 axis = d == 2 ? Vec3(0, 0, 1) : Vec3(std::sin(k), std::cos(k), 0.3).normalized();
         R.push_back(Eigen::AngleAxisd(0.7 * k, axis).toRotationMatrix());
       }
       const Eigen::MatrixXd left = Eigen::MatrixXd::Random(greens.order(), d), right = 0.1 * left;
-      const Greens turned = greens.turned(R, left, right);
+      const std::shared_ptr<const Greens> made_turned = palpate::turned(made, R, left, right);
+      const Greens& turned = *made_turned;
       const auto rotation = [&](Index k) { return R[static_cast<std::size_t>(k)].topLeftCorner(d, d); };
       std::vector<Index> nodes;  // more than one part of a product
       for (Index k = 0; k < 300; ++k) nodes.push_back((7 * k) % greens.nodes());

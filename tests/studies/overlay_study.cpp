@@ -19,7 +19,7 @@
 #include "formats/model_file.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/loop/real_time.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/bench/palpation_paths.h"
 
 namespace palpate {

@@ -26,7 +26,7 @@
 
 #include "base/error.h"
 #include "formats/model_file.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/study.h"
 #include "tests/support/surface_truth.h"
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "runtime/solve/contact_problem.h"
+#include "runtime/core/solve/contact_problem.h"
 
 namespace palpate::test {
 

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "precompute/numerics/dynamics.h"
-#include "runtime/tick/step.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 #include "tests/integrators/integrators.h"
 #include "tests/support/runtime_model.h"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/bench/palpation_paths.h"
 
 namespace palpate::test {

@@ -5,7 +5,8 @@
 
 #include <limits>
 
-#include "runtime/tick/step.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 
 namespace palpate::test {
 

@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/tick/state.h"
-#include "runtime/touch/contact_nodes.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/state.h"
+#include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate::test {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/solve/tick_tuning.h"
+#include "runtime/core/solve/tick_tuning.h"
 #include "tests/support/study.h"
 
 namespace palpate::test {

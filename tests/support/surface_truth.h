@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "runtime/body/body.h"
-#include "runtime/touch/tool.h"
+#include "runtime/core/touch/tool.h"
 #include "tests/support/coulomb_solver.h"
 
 namespace palpate::test {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "base/vectors.h"
 #include "meshes/generate.h"
-#include "meshes/node_vectors.h"
 #include "runtime/body/body.h"
 #include "runtime/live/live_model.h"
 #include "runtime/warp/body_warp.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "formats/model.h"
-#include "formats/packed.h"
+#include "matrices/packed.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 #include "precompute/numerics/greens_solver.h"

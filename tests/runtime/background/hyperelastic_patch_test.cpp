@@ -14,8 +14,8 @@
 
 #include "base/error.h"
 #include "runtime/background/patch_source.h"
-#include "runtime/body/near_field.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/body/near_field.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/mixed_body.h"
 #include "tests/support/runtime_model.h"
 
@@ -199,8 +199,7 @@ TEST_P(HyperelasticPatches, AreTheLinearOverlayForSmallForces) {
   HyperelasticPatch patch(body_, mesh());
   Push push = this->push(1e-6 * large());
   ASSERT_TRUE(patch.find(push.nodes, push.forces, {.tolerance = 1e-9, .most_steps = 20}).converged);
-  const auto linear =
-      std::make_shared<const Patch>(body_, patch.mesh(), condense(body_.model(), patch.mesh()));
+  const auto linear = make_patch(body_, patch.mesh(), condense(body_.model(), patch.mesh()));
   // Under loads the patch is deformed at rest, and another body.
   const double most = GetParam().rest > 0.0 ? 0.2 : 1e-4;
   EXPECT_LT(apart(felt(patch.linearise(), push), felt(linear, push)), most);

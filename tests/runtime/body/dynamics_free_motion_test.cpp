@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/body/patch_maker.h"
 #include "tests/support/dynamics_sample.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "runtime/body/greens.h"
-#include "runtime/body/modal_newmark.h"
+#include "runtime/core/body/greens.h"
+#include "runtime/core/body/modal_newmark.h"
 #include "runtime/body/packed_newmark.h"
 #include "tests/support/dynamics_sample.h"
 

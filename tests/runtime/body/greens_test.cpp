@@ -1,5 +1,5 @@
 // The square, the packed and a plain matrix must say the same.
-#include "runtime/body/greens.h"
+#include "runtime/core/body/greens.h"
 
 #include <gtest/gtest.h>
 
@@ -23,10 +23,10 @@ struct Case {
 class GreensLayouts : public testing::TestWithParam<Case> {
  protected:
   Eigen::MatrixXd xi_ = test::random_definite(GetParam().order, 3);
-  Greens greens_{
-      test::pack(xi_, GetParam().precision),
-      GetParam().dimension,
-      {.jobs = GetParam().jobs, .max_square_bytes = GetParam().square ? std::int64_t{1} << 32 : 0}};
+  std::shared_ptr<const Greens> made_ = make_greens(
+      test::pack(xi_, GetParam().precision), GetParam().dimension,
+      {.jobs = GetParam().jobs, .max_square_bytes = GetParam().square ? std::int64_t{1} << 32 : 0});
+  const Greens& greens_ = *made_;
   Eigen::Index d_ = GetParam().dimension;
   // Of W W^T, if there is any: 11 products of at most 1/4.
   double largest_smooth_ = GetParam().precision == Precision::split_precision ? 2.75 : 0.0;
@@ -129,7 +129,7 @@ INSTANTIATE_TEST_SUITE_P(All, GreensLayouts, testing::ValuesIn(cases()), case_na
 TEST(Greens, RefusesAnOrderThatIsNotThatOfSomeNodes) {
   for (const int dimension : {2, 3}) {
     try {
-      const Greens greens(test::pack(test::random_definite(7, 1), Precision::double_precision), dimension);
+      make_greens(test::pack(test::random_definite(7, 1), Precision::double_precision), dimension);
       FAIL() << "seven dofs were taken";
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("7 dofs, which is not " + std::to_string(dimension)),
@@ -140,7 +140,8 @@ TEST(Greens, RefusesAnOrderThatIsNotThatOfSomeNodes) {
 }
 
 TEST(Greens, IsUnfoldedByDefaultWhenItIsSmall) {
-  EXPECT_TRUE(Greens(test::pack(test::random_definite(30, 1), Precision::single_precision), 3).unfolded());
+  EXPECT_TRUE(
+      make_greens(test::pack(test::random_definite(30, 1), Precision::single_precision), 3)->unfolded());
 }
 
 /// Nested low-rank form beside the matrix it stands for.
@@ -154,7 +155,7 @@ class CompressedGreens : public testing::TestWithParam<int> {
     model.dynamics.omega = {20.0, 30.0, 50.0, 80.0};
     for (std::int64_t k = 0; k < 3 * matrix_->order(); ++k)
       model.dynamics.shapes.push_back(test::random_number(random_));
-    return Modes(model);
+    return {model.dimension(), model.dynamics.omega, model.dynamics.shapes};
   }
   /// What every way of reading says beside a matrix.
   void expect_matrix(const Greens& greens, const Eigen::MatrixXd& xi) {
@@ -202,33 +203,33 @@ class CompressedGreens : public testing::TestWithParam<int> {
 INSTANTIATE_TEST_SUITE_P(Dimension, CompressedGreens, testing::Values(2, 3));
 
 TEST_P(CompressedGreens, AreReadAsTheMatrixTheyStandFor) {
-  const Greens greens(matrix_);
-  EXPECT_TRUE(greens.compressed());
+  const std::shared_ptr<const Greens> made = make_greens(matrix_);
+  const Greens& greens = *made;
+  EXPECT_EQ(greens.compressed_form(), matrix_.get());
   EXPECT_FALSE(greens.unfolded());
-  EXPECT_FALSE(greens.split());
   EXPECT_EQ(greens.order(), xi_.rows());
   EXPECT_EQ(greens.nodes(), 83);
   EXPECT_EQ(greens.dimension(), d_);
-  EXPECT_EQ(greens.exact_terms(), 0);
+  EXPECT_EQ(greens.exact_terms(), nullptr);
   EXPECT_EQ(greens.precision(), Precision::single_precision);
   expect_matrix(greens, xi_);
 }
 
 TEST_P(CompressedGreens, TakeModesOnTop) {
   const Modes modes = this->modes();
-  Greens greens(matrix_);
   const std::vector<double> weights = {0.5, -0.25, 2.0};
-  greens.add_modes(modes, weights);
-  EXPECT_EQ(greens.exact_terms(), 3);
+  std::shared_ptr<const Greens> greens = with_modes(make_greens(matrix_), modes, weights);
+  EXPECT_EQ(greens->exact_terms()->count, 3);
+  EXPECT_EQ(greens->compressed_form(), matrix_.get());
   Eigen::MatrixXd xi = xi_;
   for (Eigen::Index i = 0; i < xi.rows(); ++i)
     for (Eigen::Index j = 0; j < xi.cols(); ++j)
       for (std::size_t k = 0; k < 3; ++k) xi(i, j) += weights[k] * modes.row(i)[k] * modes.row(j)[k];
-  expect_matrix(greens, xi);
+  expect_matrix(*greens, xi);
   // A second time: both are on top.
-  greens.add_modes(modes, std::vector<double>{-0.5, 0.25, -2.0});
-  EXPECT_EQ(greens.exact_terms(), 6);
-  expect_matrix(greens, xi_);
+  greens = with_modes(greens, modes, std::vector<double>{-0.5, 0.25, -2.0});
+  EXPECT_EQ(greens->exact_terms()->count, 6);
+  expect_matrix(*greens, xi_);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // The kept compliance against the Green's functions that it is gathered from, and the contact points that a
 // tick finds against what a naive search over the whole surface finds.
-#include "runtime/body/near_field.h"
+#include "runtime/core/body/near_field.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,10 @@
 #include <set>
 #include <vector>
 
-#include "meshes/node_vectors.h"
-#include "runtime/solve/nearest_point.h"
-#include "runtime/tick/step.h"
+#include "base/vectors.h"
+#include "runtime/body/body.h"
+#include "runtime/core/solve/nearest_point.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::near_field_test {
@@ -253,8 +254,7 @@ TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
   const Eigen::MatrixXd own = Xi;
   Xi = test::random_definite(Xi.rows(), 5);
   const Index places = near.count();
-  near.change_compliance(body_,
-                         std::make_shared<const Greens>(test::pack(Xi, Precision::double_precision), d));
+  near.change_compliance(body_, make_greens(test::pack(Xi, Precision::double_precision), d));
   EXPECT_EQ(near.count(), places);
   expect_exact();
   const Eigen::VectorXd by_other = Xi * f;

@@ -16,7 +16,7 @@
 #include "base/error.h"
 #include "meshes/element.h"
 #include "meshes/surface.h"
-#include "runtime/body/patch.h"
+#include "runtime/body/make_patch.h"
 #include "tests/support/partitioned_inverse.h"
 #include "tests/support/runtime_model.h"
 

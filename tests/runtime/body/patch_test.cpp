@@ -1,6 +1,4 @@
 // Patches as the tick uses them, against the body and its fine mesh solved as one dense system.
-#include "runtime/body/patch.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -12,9 +10,10 @@
 #include <vector>
 
 #include "meshes/element.h"
-#include "runtime/body/free_motion.h"
-#include "runtime/body/near_field.h"
+#include "runtime/body/make_patch.h"
 #include "runtime/body/overlay.h"
+#include "runtime/core/body/free_motion.h"
+#include "runtime/core/body/near_field.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::patch_test {
@@ -168,7 +167,7 @@ void expect_compliance(const NearField& near, const MatrixXd& reference) {
 // All surface nodes in turn, in the patch and beside it, with patches that come and go.
 TEST_P(Patches, AreWhatTheNearFieldHas) {
   const PatchMesh patch_mesh = mesh();
-  const auto patch = std::make_shared<const Patch>(body_, patch_mesh, condense(body_.model(), patch_mesh));
+  const auto patch = make_patch(body_, patch_mesh, condense(body_.model(), patch_mesh));
   std::vector<Index> all(body_.surface_rest_positions().size());
   for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<Index>(k);
   const MatrixXd with = reference(patch_mesh, all);

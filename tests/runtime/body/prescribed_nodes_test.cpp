@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::prescribed_nodes_test {

@@ -11,7 +11,8 @@
 
 #include "base/error.h"
 #include "overlay/condensation.h"
-#include "runtime/tick/step.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/dense_algebra.h"
 #include "tests/support/runtime_model.h"
 
@@ -44,7 +45,8 @@ TEST_P(Scaled, GreensFunctionsAreThoseOfTheStifferElements) {
   scale_stiffness(model, scale);
   EXPECT_EQ(model.materials[0].youngs_modulus, scale);
   const Eigen::MatrixXd xi = stiffness_of(model).inverse();
-  const Greens greens(model.greens, 3, {.max_square_bytes = GetParam()});
+  const std::shared_ptr<const Greens> made = make_greens(model.greens, 3, {.max_square_bytes = GetParam()});
+  const Greens& greens = *made;
   ASSERT_EQ(greens.unfolded(), GetParam() < 0);
   const std::vector<Index> nodes = {3, 20};
   EXPECT_LT((greens.block(3, 20) - xi.block<3, 3>(9, 60)).norm(), 1e-11 * xi.norm());

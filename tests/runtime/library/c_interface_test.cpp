@@ -23,13 +23,13 @@
 #include <utility>
 #include <vector>
 
+#include "base/vectors.h"
 #include "formats/model_file.h"
-#include "meshes/node_vectors.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/library/palpate.h"
-#include "runtime/tick/status.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/status.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/folders.h"
 #include "tests/support/meshes_files.h"
 

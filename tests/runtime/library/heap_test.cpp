@@ -26,8 +26,8 @@
 #include "runtime/background/surface_frames.h"
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/prescribed_nodes.h"
+#include "runtime/core/tick/step.h"
 #include "runtime/library/palpate.h"
-#include "runtime/tick/step.h"
 #include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/folders.h"
 #include "tests/support/live_session.h"
@@ -452,8 +452,9 @@ class CompressedGreens : public testing::TestWithParam<int> {
   }
 
   std::size_t d_ = static_cast<std::size_t>(GetParam());
-  Greens greens_{std::make_shared<const HierarchicalMatrix>(
-      test::random_hierarchical({.dimension = GetParam(), .nodes = 331, .levels = 5}, 1))};
+  std::shared_ptr<const Greens> made_ = make_greens(std::make_shared<const HierarchicalMatrix>(
+      test::random_hierarchical({.dimension = GetParam(), .nodes = 331, .levels = 5}, 1)));
+  const Greens& greens_ = *made_;
   ErrorBound bound_{*greens_.compressed_form(), 500};
   std::vector<Index> nodes_ = [] {
     std::vector<Index> nodes;

@@ -8,8 +8,8 @@
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/motion_source.h"
-#include "runtime/tick/step.h"
-#include "runtime/tick/surface_motion.h"
+#include "runtime/core/tick/step.h"
+#include "runtime/core/tick/surface_motion.h"
 #include "tests/support/live_session.h"
 
 namespace palpate::live_compliance_test {

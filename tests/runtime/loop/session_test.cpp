@@ -22,7 +22,7 @@
 #include "runtime/loop/recorder.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::session_test {

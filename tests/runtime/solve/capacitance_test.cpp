@@ -1,5 +1,5 @@
 // The factor that grows and shrinks against Eigen's, computed afresh.
-#include "runtime/solve/capacitance.h"
+#include "runtime/core/solve/capacitance.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

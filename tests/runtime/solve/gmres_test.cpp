@@ -1,5 +1,5 @@
 // GMRES against Eigen's dense solvers.
-#include "runtime/solve/gmres.h"
+#include "runtime/core/solve/gmres.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What forces of a solver that was cut short are said to lack, against what they do lack.
-#include "runtime/solve/imbalance.h"
+#include "runtime/core/solve/imbalance.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/solve/active_set.h"
-#include "runtime/solve/cone_solver.h"
-#include "runtime/solve/newton_krylov.h"
-#include "runtime/solve/tick_tuning.h"
+#include "runtime/core/solve/active_set.h"
+#include "runtime/core/solve/cone_solver.h"
+#include "runtime/core/solve/newton_krylov.h"
+#include "runtime/core/solve/tick_tuning.h"
 #include "tests/support/contact_grid.h"
 
 namespace palpate::imbalance_test {

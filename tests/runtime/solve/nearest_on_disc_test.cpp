@@ -1,5 +1,5 @@
 // Nearest points of a disc against the plane that parts it from the simplex, dense samples, and by hand.
-#include "runtime/solve/nearest_on_disc.h"
+#include "runtime/core/solve/nearest_on_disc.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

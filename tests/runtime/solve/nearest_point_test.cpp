@@ -1,5 +1,5 @@
 // Nearest points against the optimality conditions of the convex minimum that they are, and by hand.
-#include "runtime/solve/nearest_point.h"
+#include "runtime/core/solve/nearest_point.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

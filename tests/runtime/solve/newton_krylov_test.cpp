@@ -1,5 +1,5 @@
 // The solver for many contacts, against a slow one in double precision and against the active set.
-#include "runtime/solve/newton_krylov.h"
+#include "runtime/core/solve/newton_krylov.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/solve/active_set.h"
-#include "runtime/solve/contact_problem.h"
-#include "runtime/solve/tick_tuning.h"
+#include "runtime/core/solve/active_set.h"
+#include "runtime/core/solve/contact_problem.h"
+#include "runtime/core/solve/tick_tuning.h"
 #include "tests/support/contact_grid.h"
 
 namespace palpate::newton_krylov_test {

@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "runtime/solve/active_set.h"
-#include "runtime/solve/cone_solver.h"
+#include "runtime/core/solve/active_set.h"
+#include "runtime/core/solve/cone_solver.h"
 #include "tests/support/dense_algebra.h"
 
 namespace palpate::solvers_test {

@@ -1,5 +1,5 @@
 // The tree against looking at every simplex, and inside() against solid angles.
-#include "runtime/solve/surface_tree.h"
+#include "runtime/core/solve/surface_tree.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Products with symmetric matrices against plain sums in double precision.
-#include "runtime/solve/symmetric_product.h"
+#include "runtime/core/solve/symmetric_product.h"
 
 #include <gtest/gtest.h>
 

@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "runtime/tick/step.h"
-#include "runtime/touch/tool_geometry.h"
-#include "runtime/touch/touching_pair.h"
+#include "runtime/core/tick/step.h"
+#include "runtime/core/touch/tool_geometry.h"
+#include "runtime/core/touch/touching_pair.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

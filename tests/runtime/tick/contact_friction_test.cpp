@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/vectors.h"
 #include "meshes/generate.h"
-#include "meshes/node_vectors.h"
-#include "runtime/solve/cone_solver.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/solve/cone_solver.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

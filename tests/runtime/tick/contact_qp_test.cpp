@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "runtime/body/body.h"
-#include "runtime/solve/active_set.h"
-#include "runtime/solve/contact_problem.h"
-#include "runtime/solve/nearest_on_disc.h"
-#include "runtime/tick/contact_detection.h"
-#include "runtime/tick/step.h"
-#include "runtime/touch/tool_geometry.h"
+#include "runtime/core/solve/active_set.h"
+#include "runtime/core/solve/contact_problem.h"
+#include "runtime/core/solve/nearest_on_disc.h"
+#include "runtime/core/tick/contact_detection.h"
+#include "runtime/core/tick/step.h"
+#include "runtime/core/touch/tool_geometry.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::contact_qp_test {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "meshes/node_vectors.h"
-#include "runtime/tick/hand_force.h"
-#include "runtime/tick/step.h"
+#include "base/vectors.h"
+#include "runtime/core/tick/hand_force.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

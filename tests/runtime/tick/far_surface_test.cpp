@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "runtime/body/body.h"
-#include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/solve/tick_tuning.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate {

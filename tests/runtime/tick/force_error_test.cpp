@@ -1,14 +1,14 @@
 // What a tick that had no room for all contact points says of its force, against one that had.
-#include "runtime/tick/force_error.h"
+#include "runtime/core/tick/force_error.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/linearise.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/solve/tick_tuning.h"
+#include "runtime/core/tick/linearise.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

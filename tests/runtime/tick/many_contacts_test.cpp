@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/compliance.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/solve/tick_tuning.h"
+#include "runtime/core/tick/compliance.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

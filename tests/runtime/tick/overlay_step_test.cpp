@@ -11,7 +11,7 @@
 
 #include "base/error.h"
 #include "runtime/background/patch_source.h"
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::overlay_step_test {

@@ -3,7 +3,8 @@
 
 #include <limits>
 
-#include "runtime/tick/step.h"
+#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/baked_body.h"
 
 namespace palpate::precision_tick_test {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/rest_cases.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"

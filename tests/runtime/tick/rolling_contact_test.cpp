@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

@@ -1,5 +1,5 @@
 // The tick, and what it does with tools that misbehave.
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "meshes/node_vectors.h"
+#include "base/vectors.h"
 #include "runtime/body/prescribed_nodes.h"
 #include "tests/support/runtime_model.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "runtime/tick/step.h"
+#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 

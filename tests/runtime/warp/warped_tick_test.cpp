@@ -7,8 +7,8 @@
 
 #include "runtime/background/motion_source.h"
 #include "runtime/background/warped_motion.h"
-#include "runtime/tick/step.h"
-#include "runtime/tick/surface_motion.h"
+#include "runtime/core/tick/step.h"
+#include "runtime/core/tick/surface_motion.h"
 #include "tests/support/live_session.h"
 #include "tests/support/warp_cases.h"
 

@@ -1,0 +1,135 @@
+// C of a near field's nodes, from the Green's functions and from the patch.
+#include <algorithm>
+
+#include "runtime/core/body/near_field.h"
+#include "runtime/core/solve/vector_loops.h"
+
+namespace palpate {
+
+/// X = Xi_Q of forces on the node, and Y = M X.
+void NearField::respond(const ElasticBody& body, Index place) noexcept {
+  const std::span<const Index> Q = patch()->stored_nodes();
+  const std::ptrdiff_t width = patch_dofs();
+  for (int axis = 0; axis < dimension_; ++axis) std::fill_n(X(dimension_ * place + axis), width, 0.0);
+  for (const FollowedNodes::Part& part : followed_.parts(place)) {
+    body.greens().gather(followed_.nodes()[at(part.number)], Q,
+                         {work_.gathered.data(), static_cast<std::size_t>(dimension_ * width)});
+    for (int axis = 0; axis < dimension_; ++axis)
+      palpate::add(work_.gathered.data() + axis * width, part.weight, X(dimension_ * place + axis), width);
+  }
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const double* x = X(dimension_ * place + axis);
+    double* y = Y(dimension_ * place + axis);
+    for (std::ptrdiff_t dof = 0; dof < width; ++dof)
+      y[dof] = dot(patch()->correction(static_cast<Index>(dof)), x, width);
+  }
+}
+
+/// C between a node and the first `count`, which are those before it and itself; for a group it may be more.
+void NearField::connect(const ElasticBody& body, Index place, Index count) noexcept {
+  if (patch_place(place) >= 0) {
+    connect_within_patch(place);
+  } else if (is_group(place)) {
+    connect_by_members(place, count);
+  } else {
+    connect_beside_patch(body, place);
+  }
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * count;
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis)
+    std::copy_n(work_.blocks.data() + axis * width, width, C_.data() + (d * place + axis) * stride_);
+  // The node's columns go into each row at once: a row is a place in memory of its own.
+  for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
+    double* entries = C_.data() + dof * stride_ + d * place;
+    for (std::ptrdiff_t axis = 0; axis < d; ++axis)
+      entries[axis] = work_.blocks[at(static_cast<Index>(axis * width + dof))];
+  }
+}
+
+/// From the members' rows: A^T C A of their maps A.
+void NearField::connect_by_members(Index place, Index count) noexcept {
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * count, after = d * (place + 1);
+  std::fill_n(work_.blocks.data(), d * width, 0.0);
+  const auto for_each_entry = [&](auto&& visit) {
+    for_each_member(place, [&](Index member, double, const Eigen::Matrix3d& map) {
+      for (std::ptrdiff_t a = 0; a < d; ++a) {
+        for (std::ptrdiff_t i = 0; i < d; ++i) visit(d * place_of(member) + a, i, map(a, i));
+      }
+    });
+  };
+  for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t i, double factor) {
+    const double* row = C_.data() + dof * stride_;
+    double* block = work_.blocks.data() + i * width;
+    palpate::add(row, factor, block, d * place);
+    palpate::add(row + after, factor, block + after, width - after);
+  });
+  for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t j, double factor) {
+    for (std::ptrdiff_t i = 0; i < d; ++i)
+      work_.blocks[at(static_cast<Index>(i * width + d * place + j))] +=
+          factor * work_.blocks[at(static_cast<Index>(i * width + dof))];
+  });
+}
+
+/// Displacement of an added node along one axis by a group that is here: `by` has that by stored nodes.
+void NearField::connect_to_group(Index group, const double* by, double* block) const noexcept {
+  const FollowedNodes::Part* part = followed_.parts(group).data();  // each member follows one stored node
+  std::fill_n(block, dimension_, 0.0);
+  for_each_member(group, [&](Index, double, const Eigen::Matrix3d& map) {
+    const double* u = by + std::ptrdiff_t{dimension_} * part->number;
+    for (int j = 0; j < dimension_; ++j) {
+      for (int a = 0; a < dimension_; ++a) block[j] += part->weight * map(a, j) * u[a];
+    }
+    ++part;
+  });
+}
+
+void NearField::connect_within_patch(Index place) noexcept {
+  const Index d = dimension_;
+  double* block = work_.blocks.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* C = patch()->compliance(d * patch_place(place) + i);
+    const double* H = patch()->response(d * patch_place(place) + i);
+    for (Index other = 0; other <= place; ++other) {
+      for (Index j = 0; j < d; ++j) {
+        *block++ =
+            patch_place(other) >= 0 ? C[d * patch_place(other) + j] : dot(H, X(d * other + j), patch_dofs());
+      }
+    }
+  }
+}
+
+void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexcept {
+  const Index d = dimension_;
+  const std::ptrdiff_t width = d * std::ssize(followed_.nodes());
+  std::fill_n(work_.by_followed.data(), d * width, 0.0);
+  for (const FollowedNodes::Part& part : followed_.parts(place)) {
+    load_.greens(body).gather(followed_.nodes()[at(part.number)], followed_.nodes(),
+                              {work_.gathered.data(), static_cast<std::size_t>(d * width)});
+    palpate::add(work_.gathered.data(), part.weight, work_.by_followed.data(), d * width);
+  }
+  double* block = work_.blocks.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* by = work_.by_followed.data() + i * width;
+    for (Index other = 0; other <= place; ++other) {
+      if (is_group(other)) {
+        connect_to_group(other, by, block);
+        block += d;
+        continue;
+      }
+      for (Index j = 0; j < d; ++j) {
+        double sum = 0.0;
+        if (patch_place(other) >= 0) {
+          sum = dot(patch()->response(d * patch_place(other) + j), X(d * place + i), patch_dofs());
+        } else {
+          for (const FollowedNodes::Part& part : followed_.parts(other))
+            sum += part.weight * by[d * part.number + j];
+          if (patch() != nullptr) sum += dot(X(d * other + j), Y(d * place + i), patch_dofs());
+        }
+        *block++ = sum;
+      }
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,70 @@
+// Overlay in the form that the tick uses.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/vectors.h"
+
+namespace palpate {
+
+/// Patch of the body's surface with a finer mesh below it, condensed (theory.md section 4) to the data of the
+/// tick, whose size below the surface does not depend on the refinement. d dofs per node; Q are the g nodes
+/// of the body in the patch. Constant once made; any number of threads may use it.
+class Patch {
+ public:
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  /// Shapes as those of the members below.
+  struct Parts {
+    std::vector<Index> elements;
+    std::vector<Index> surface_nodes;
+    std::vector<Index> stored_nodes;
+    Rows compliance;
+    Rows response;
+    Rows correction;
+    Eigen::VectorXd offset{};         ///< empty: none
+    Eigen::VectorXd offset_forces{};  ///< as this
+  };
+  explicit Patch(Parts parts) : parts_(std::move(parts)) {}
+
+  /// [m] surface nodes of the body (ElasticBody::simplices), ascending.
+  [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return parts_.surface_nodes; }
+  /// Elements of the body that it refines, ascending.
+  [[nodiscard]] std::span<const Index> elements() const noexcept { return parts_.elements; }
+  /// [g] stored nodes Q.
+  [[nodiscard]] std::span<const Index> stored_nodes() const noexcept { return parts_.stored_nodes; }
+
+  /// Row [d m] of the compliance between surface nodes, T Xi_G,QQ T^T + K_L^-1 [m/N]: of dof d k + axis for
+  /// the k-th of them.
+  [[nodiscard]] const double* compliance(Index dof) const noexcept {
+    return parts_.compliance.row(dof).data();
+  }
+  /// Row [d g] of H = T (I + Xi_QQ M): displacement of a surface dof by the displacement of Q that forces
+  /// outside the patch cause without the overlay. Conversely, forces f on the surface nodes act on the rest
+  /// of the body as H^T f on Q without the overlay.
+  [[nodiscard]] const double* response(Index dof) const noexcept { return parts_.response.row(dof).data(); }
+  /// Row [d g] of M [N/m]: forces on Q that represent the overlay, beside forces elsewhere (Overlay).
+  [[nodiscard]] const double* correction(Index dof) const noexcept {
+    return parts_.correction.row(dof).data();
+  }
+
+  /// True if it is displaced without forces, as patches from a tangent are; otherwise the next two are empty.
+  [[nodiscard]] bool has_offset() const noexcept { return parts_.offset.size() > 0; }
+  /// [d m] displacement of the surface's dofs under no forces [m].
+  [[nodiscard]] const Eigen::VectorXd& offset() const noexcept { return parts_.offset; }
+  /// [d g] forces on Q that, without the overlay, cause the displacement of the rest of the body under no
+  /// forces [N].
+  [[nodiscard]] const Eigen::VectorXd& offset_forces() const noexcept { return parts_.offset_forces; }
+
+  /// Memory use [byte].
+  [[nodiscard]] std::size_t bytes() const noexcept;
+
+ private:
+  Parts parts_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,54 @@
+// Load that determines the displacement of the whole surface.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/core/body/greens.h"
+#include "runtime/core/body/patch.h"
+
+namespace palpate {
+
+class ElasticBody;
+
+/// Forces of a tick. Assigning one of the same body and capacities allocates nothing.
+struct SurfaceLoad {
+  /// Capacities: loaded nodes near the tools, stored nodes that they follow, and nodes g of a patch.
+  SurfaceLoad(int dimension, Index near_nodes, Index stored_nodes, Index patch_nodes);
+
+  void clear() noexcept;
+  /// Adds a force [N] on a stored node.
+  void add(Index stored, const double* force) noexcept;
+  /// Adds a force [N] on a surface node of the patch, given by its place there.
+  void add_to_patch(Index place, const double* force) noexcept;
+
+  /// Stored nodes and forces on them, d numbers each [N], that displace the body without the overlay as it is
+  /// with the overlay.
+  [[nodiscard]] std::span<const Index> nodes() const noexcept {
+    return {node.data(), static_cast<std::size_t>(count)};
+  }
+  [[nodiscard]] std::span<const double> forces() const noexcept {
+    return {force.data(), static_cast<std::size_t>(dimension * count)};
+  }
+
+  /// Compliance for the forces: `compliance`, or the body's Green's functions.
+  [[nodiscard]] const Greens& greens(const ElasticBody& body) const noexcept;
+
+  int dimension;  ///< d
+  Index count = 0;
+  std::vector<Index> node;
+  std::vector<double> force;
+  std::shared_ptr<const Patch> patch;        ///< null if there is no overlay
+  std::shared_ptr<const Greens> compliance;  ///< for a body that has changed; null: the body's
+  Index patch_count = 0;                     ///< number of forces on surface nodes of the patch
+  std::vector<Index> patch_place;
+  std::vector<double> patch_force;
+  std::vector<double> beside;  ///< [d g] displacement of Q by forces outside the patch, without overlay [m]
+};
+
+/// Computes the displacement [m], d numbers each, of the patch's surface nodes from place `first` on, as many
+/// as fit.
+void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> u) noexcept;
+
+}  // namespace palpate
