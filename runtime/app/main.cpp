@@ -21,7 +21,6 @@
 #include "runtime/app/probe.h"
 #include "runtime/app/session.h"
 #include "runtime/app/view.h"
-#include "runtime/gallery/gallery.h"
 #include "runtime/loop/numbers.h"
 #include "runtime/push/push_command.h"
 #include "runtime/push/solved_settings.h"
@@ -272,15 +271,6 @@ int push(const PushArguments& arguments) {
   return play(options);
 }
 
-/// Views one or two recordings, or a folder.
-int view_files(const std::vector<std::filesystem::path>& files, const ViewerOptions& options) {
-  if (files.empty()) return show_gallery(".", options);
-  std::error_code problem;
-  if (files.size() == 1 && std::filesystem::is_directory(files.front(), problem))
-    return show_gallery(files.front(), options);
-  return view(files, options);
-}
-
 /// Returns the tables of settings and safety bounds, with units and defaults separate from their meanings.
 nlohmann::ordered_json number_tables() {
   nlohmann::ordered_json settings = nlohmann::ordered_json::array(), safety = settings;
@@ -337,9 +327,7 @@ int run(int argc, char** argv) {
     }
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.finish);
-    if (view_command->parsed()) {
-      return view_files(arguments.recordings, read_viewer(arguments.viewer));
-    }
+    if (view_command->parsed()) return view(arguments.recordings, read_viewer(arguments.viewer));
     if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));

@@ -1,5 +1,3 @@
-#include "runtime/app/play.h"
-
 #include <fmt/core.h>
 
 #include <atomic>
@@ -14,6 +12,7 @@
 #include "formats/outputs/output_paths.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"
+#include "runtime/app/play_options.h"
 #include "runtime/app/play_session.h"
 #include "runtime/app/session_view.h"
 #include "runtime/app/viewed_play.h"

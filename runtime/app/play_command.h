@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "runtime/app/play.h"
+#include "runtime/app/play_options.h"
 
 namespace palpate {
 

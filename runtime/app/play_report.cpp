@@ -6,12 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
-#include <optional>
-#include <string_view>
 #include <vector>
 
-#include "base/json_text.h"
 #include "base/program.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/background/live_motion.h"
@@ -19,17 +15,9 @@
 #include "runtime/live/live_model.h"
 #include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/output.h"
-#include "runtime/warp/studied_range.h"
-#include "statics/surface_change.h"
 
 namespace palpate {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-double microseconds(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds) * 1e-3;
-}
 
 constexpr double most_patch_residual = 1e-3;  // largest one that is not reported
 
@@ -186,67 +174,6 @@ void warn_of_places(const PlayedRun& run) {
   }
 }
 
-/// Returns the largest use of each fixed capacity of the tick.
-Json json_room(const State& state) {
-  const HighWater& most = state.scratch.high_water;
-  const auto entry = [](Index used, auto room) { return Json{{"most", used}, {"room", room}}; };
-  return {{"near_nodes", entry(most.near_nodes, state.surface.near.capacity())},
-          {"contact_points", entry(most.contact_points, state.max_contacts())},
-          {"unknowns", entry(most.unknowns, state.scratch.rows.size())},
-          {"simplices", entry(most.simplices, state.scratch.detection.pairs.size())}};
-}
-
-Json json_tool(const Tool& tool) {
-  return {{"radius_m", tool.radius},
-          {"length_m", tool.length},
-          {"disc_radius_m", tool.disc_radius},
-          {"reach_m", tool.reach},
-          {"friction", tool.friction ? Json(*tool.friction) : Json()},
-          {"coupling_N_per_m", tool.coupling_stiffness},
-          {"coupling_torsion_Nm_per_rad", tool.coupling_torsion},
-          {"max_force_N", tool.max_force},
-          {"hand_over", tool.hand_over}};
-}
-
-Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
-  const PatchCounts& counts = overlays.counts();
-  Json json = {{"refinement", options.refinement},
-               {"rings", options.rings},
-               {"built", overlays.built()},
-               {"failed", overlays.failed()},
-               {"longest_build_s", overlays.longest_build()},
-               {"bytes", overlays.bytes()},
-               {"switches", counts.switches},
-               {"ticks_near", counts.ticks},
-               {"older_ticks_near", counts.older},
-               {"ticks_in_contact", counts.in_contact},
-               {"older_ticks_in_contact", counts.older_in_contact}};
-  if (overlays.tangents() == nullptr) return json;
-  const PatchTangentTelling telling = overlays.tangents()->telling();
-  json["neo_hookean"] = {{"made", telling.made},
-                         {"failed", telling.failed},
-                         {"steps_cut", telling.cuts},
-                         {"with_inverted_elements", telling.with_inverted},
-                         {"most_inverted", telling.most_inverted},
-                         {"last_residual", telling.last_residual},
-                         {"longest_s", telling.longest}};
-  return json;
-}
-
-std::string_view name_of(DynamicsMethod method) {
-  if (method == DynamicsMethod::none) return "none";
-  return method == DynamicsMethod::packed ? "packed" : "modal";
-}
-
-const LiveMotion* live_motion(const PlayedRun& run) {
-  return run.motion != nullptr ? dynamic_cast<const LiveMotion*>(&run.motion->stepper()) : nullptr;
-}
-
-const WarpedMotion* warped_motion(const PlayedRun& run) {
-  return run.motion != nullptr ? dynamic_cast<const WarpedMotion*>(&run.motion->stepper()) : nullptr;
-}
-
-constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
 constexpr double most_warp_residual = 1e-3;  // largest one that is not reported
 
 void print_warp(const WarpTelling& warp) {
@@ -260,19 +187,6 @@ void print_warp(const WarpTelling& warp) {
                     warp.last_residual));
 }
 
-Json json_warp(const WarpTelling& warp) {
-  return {{"largest_rotation_deg", degrees_a_radian * warp.largest_rotation},
-          {"last_rotation_deg", degrees_a_radian * warp.last_rotation},
-          {"compliance_turns", warp.turns},
-          {"steps_unbalanced", warp.unbalanced},
-          {"last_residual", warp.last_residual}};
-}
-
-/// Largest error of the tool's force, whether the body moved or stood still [N].
-double largest_force_error(const LiveTelling& live, const LoopReport& report) {
-  return std::max(live.largest_force_error, report.best_effort.largest_late_error);
-}
-
 void print_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
   const LiveCounts& counts = live.counts;
   say(stderr,
@@ -283,8 +197,8 @@ void print_live(const Body& body, const LiveTelling& live, const LoopReport& rep
   say(stderr,
       "the tool met the compliance of {:.3g} s ago, renewed {} times and turned {} times; against the solver "
       "it was off by {:.2g} m and {:.2g} N at most, of forces up to {:.3g} N\n",
-      live.compliance_age, live.renewals, live.turns, live.largest_error, largest_force_error(live, report),
-      live.largest_force);
+      live.compliance_age, live.renewals, live.turns, live.largest_error,
+      std::max(live.largest_force_error, report.best_effort.largest_late_error), live.largest_force);
   if (counts.near_limit > 0)
     print_warning(fmt::format(
         "the body stiffened: {} explicit steps of {:.3g} s were longer than nine tenths of the longest "
@@ -299,134 +213,15 @@ void print_live(const Body& body, const LiveTelling& live, const LoopReport& rep
                     counts.stopped));
 }
 
-Json json_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
-  const LiveCounts& counts = live.counts;
-  return {{"solver", name_of(body.live()->body.options().law)},
-          {"integrator", name_of(body.live()->stepper.scheme.integrator)},
-          {"step_s", body.live()->stepper.time_step},
-          {"steps", counts.steps},
-          {"steps_cut", counts.halved},
-          {"steps_stopped", counts.stopped},
-          {"steps_with_inverted_elements", counts.inverted},
-          {"most_inverted", counts.most_inverted},
-          {"plastic_work_J", counts.plastic_work},
-          {"longest_stable_step_s", std::isfinite(live.step_limit) ? Json(live.step_limit) : Json(nullptr)},
-          {"steps_near_limit", counts.near_limit},
-          {"compliance_age_s", live.compliance_age},
-          {"compliance_renewals", live.renewals},
-          {"compliance_turns", live.turns},
-          {"largest_error_m", live.largest_error},
-          {"last_error_m", live.last_error},
-          {"largest_force_error_N", largest_force_error(live, report)},
-          {"last_force_error_N", live.last_force_error},
-          {"largest_force_N", live.largest_force}};
-}
-
-Json json_dynamics(const Body& body, const MotionSource* motion) {
-  const bool is_warped = body.contact_model() == ContactModel::warped;
-  const bool is_dynamic = !is_warped && body.contact_model() != ContactModel::quasi_static;
-  Json json = {{"method", body.live() != nullptr ? "live"
-                          : is_warped            ? "none"
-                                                 : name_of(body.model().dynamics.method)},
-               {"contact", is_dynamic ? "dynamic" : "quasi-static"}};
-  if (motion != nullptr) {
-    json["steps"] = motion->steps();
-    json["longest_step_s"] = motion->longest_step();
-  }
-  return json;
-}
-
-/// Counts of durations by class: [upper end in ns, count], each class twice as long as the one before.
-Json json_histogram(const TimeHistogram& histogram) {
-  Json json = Json::array();
-  std::int64_t from = 0;
-  for (std::int64_t to = 500; from <= histogram.worst(); to *= 2) {
-    json.push_back({to, histogram.total_between(from, to)});
-    from = to;
-  }
-  return json;
-}
-
-Json json_times(const TimeHistogram& histogram) {
-  return {{"median", histogram.percentile(0.5)},
-          {"p99_9", histogram.percentile(0.999)},
-          {"p99_99", histogram.percentile(0.9999)},
-          {"worst", histogram.worst()},
-          {"histogram", json_histogram(histogram)}};
-}
-
-Json json_safety(const LoopReport& report) {
-  Json faults;
-  for (std::size_t k = 1; k < fault_names.size(); ++k) faults[fault_names[k].second] = report.faults[k];
-  return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
-}
-
-/// Change of the surface relative to the mesh, after the last tick.
-SurfaceChange last_change(const PlayedRun& run) {
-  const Body& body = run.body;
-  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
-  std::vector<Vec3> u(body.surface_rest_positions().size());
-  MotionSnapshot motion(body);
-  run.state.surface.motion.snapshot(motion);
-  surface_displacement(body, run.state.surface.near.load(), stored, u, &motion);
-  const std::vector<Vec3> mesh = body.surface_in_mesh();
-  for (std::size_t node = 0; node < u.size(); ++node)
-    u[node] += body.surface_rest_positions()[node] - mesh[node];
-  return surface_change(body.dimension(), body.simplices(), mesh, u);
-}
-
-Json json_surface(const PlayedRun& run) {
-  const SurfaceChange change = last_change(run);
-  const std::optional<double> studied = studied_rotation(run.body);
-  return {{"last_rotation_deg", degrees_a_radian * change.rotation},
-          {"last_strain", change.strain},
-          {"studied_rotation_deg", studied ? Json(degrees_a_radian * *studied) : Json()}};
-}
-
-Json json_device(const PlayedRun& run) {
-  Json json = {{"name", run.options.device.text}};
-  if (run.link != nullptr) {
-    json["description"] = run.link->name();
-    json["reports"] = run.link->reports();
-    json["writes"] = run.link->writes();
-    json["worst_write_ns"] = run.link->worst_write();
-    json["writes_without_loop"] = run.link->extrapolated();
-    json["opened_again"] = run.report.opened_again;
-    json["refused"] = run.link->refusals();
-  }
-  return json;
-}
-
-Json json_parts(const PlayedParts& parts) {
-  Json rows = Json::array();
-  for (const auto& row : parts.rows()) {
-    const std::string recording = row.part.recording.string();
-    rows.push_back({{"because", row.part.because},
-                    {"begun_s", row.begun},
-                    {"sessions", row.sessions},
-                    {"settings", row.part.settings},
-                    {"recording", recording.empty() ? Json() : Json(recording)},
-                    {"dropped_ticks", row.part.dropped},
-                    {"ticks", row.ticks},
-                    {"ticks_in_contact", row.ticks_in_contact},
-                    {"deadline_misses", row.misses},
-                    {"faults", row.faults},
-                    {"largest_force_N", row.largest_force},
-                    {"largest_shown_N", row.largest_shown}});
-  }
-  return rows;
-}
-
-Json json_replay(const ReplayDifference& replay) {
-  const bool differs = replay.first_tick >= 0;
-  return {{"ticks", replay.ticks},
-          {"different_ticks", replay.different},
-          {"largest_difference_N", replay.largest},
-          {"first_different_tick", differs ? Json(replay.first_tick) : Json()},
-          {"first_different_field", differs ? Json(replay.first_field) : Json()}};
-}
-
 }  // namespace
+
+const LiveMotion* PlayedRun::live() const {
+  return motion != nullptr ? dynamic_cast<const LiveMotion*>(&motion->stepper()) : nullptr;
+}
+
+const WarpedMotion* PlayedRun::warped() const {
+  return motion != nullptr ? dynamic_cast<const WarpedMotion*>(&motion->stepper()) : nullptr;
+}
 
 void print_report(const PlayedRun& run) {
   print_loop(run.report, run.options.fast);
@@ -442,60 +237,10 @@ void print_report(const PlayedRun& run) {
     say(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
         1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
-  if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling(), run.report);
-  if (const WarpedMotion* warped = warped_motion(run)) print_warp(warped->telling());
+  if (const LiveMotion* live = run.live()) print_live(run.body, live->telling(), run.report);
+  if (const WarpedMotion* warped = run.warped()) print_warp(warped->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
-}
-
-std::string json_report(const PlayedRun& run) {
-  const LoopReport& report = run.report;
-  Json status;
-  for (std::size_t k = 0; k < status_names.size(); ++k)
-    status[status_names[k].second] = report.status_ticks[k];
-  Json json = {{"generator", "palpate-runtime " PALPATE_VERSION},
-               {"file", run.options.file.string()},
-               {"model", run.body.model().name},
-               {"fast", run.options.fast},
-               {"interrupted", report.interrupted},
-               {"tool", json_tool(run.tool)},
-               {"ticks", report.ticks},
-               {"ticks_in_contact", report.ticks_in_contact},
-               {"ticks_begun_inside", report.ticks_begun_inside},
-               {"most_contacts", report.most_contacts},
-               {"rate_Hz", report.rate},
-               {"deadline_misses", report.deadline_misses}};
-  if (!run.options.fast) json["lateness_ns"] = json_times(report.lateness);
-  json["compute_ns"] = json_times(report.compute);
-  json["largest_force_N"] = report.largest_force;
-  json["largest_force_time_s"] = report.largest_force_time;
-  json["largest_force_depth_m"] = report.largest_force_depth;
-  json["largest_force_mesh_stiffening"] = report.largest_force_stiffening;
-  json["largest_jump_N"] = report.largest_jump;
-  json["largest_jump_time_s"] = report.largest_jump_time;
-  if (report.largest_greens_error > 0.0) {
-    json["largest_greens_error_N"] = report.largest_greens_error;
-    json["largest_greens_error_time_s"] = report.largest_greens_error_time;
-  }
-  json["status_ticks"] = status;
-  json["best_effort"] = to_json(report.best_effort);
-  json["room"] = json_room(run.state);
-  json["surface"] = json_surface(run);
-  json["device"] = json_device(run);
-  if (run.settings.safety) json["safety"] = json_safety(report);
-  if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
-  if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
-  json["dynamics"] = json_dynamics(run.body, run.motion);
-  if (const LiveMotion* live = live_motion(run))
-    json["live"] = json_live(run.body, live->telling(), run.report);
-  if (const WarpedMotion* warped = warped_motion(run)) json["warp"] = json_warp(warped->telling());
-  if (!run.options.record.empty()) {
-    json["recording"] = run.options.record.string();
-    json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();
-  }
-  json["dropped_ticks"] = run.dropped;
-  if (run.parts != nullptr) json["parts"] = json_parts(*run.parts);
-  return json_text(json, 2);
 }
 
 }  // namespace palpate

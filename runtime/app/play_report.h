@@ -1,6 +1,7 @@
 // Report of a run at its end.
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -11,6 +12,11 @@
 #include "runtime/loop/played_parts.h"
 
 namespace palpate {
+
+constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
+
+class LiveMotion;
+class WarpedMotion;
 
 /// Run and its parts; the pointers may be null.
 struct PlayedRun {
@@ -25,8 +31,11 @@ struct PlayedRun {
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;
   std::int64_t dropped = 0;                     ///< ticks missing from the recording
-  std::int64_t dropped_frames = 0;              ///< frames missing from it
+  std::int64_t dropped_frames = 0;              ///< frames that the recording lacks
   std::optional<Error> recording_failure = {};  ///< reason if the recording is incomplete
+
+  [[nodiscard]] const LiveMotion* live() const;      ///< of `motion`, null where it is another
+  [[nodiscard]] const WarpedMotion* warped() const;  ///< likewise
 };
 
 /// Prints a few lines for a person, and warnings, to the error stream.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <string_view>
 
 #include "meshes/element_type.h"
 #include "runtime/app/fitting_tool.h"
@@ -30,15 +29,9 @@ nlohmann::json vector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// Returns the name of a numbered constant.
-template <class Names>
-std::string_view name_of(const Names& names, std::size_t number) {
-  return names[std::min(number, names.size() - 1)].second;
-}
-
 nlohmann::json fault_or_null(Fault fault) {
   if (fault == Fault::none) return {};
-  return {{"name", name_of(fault_names, static_cast<std::size_t>(fault))}, {"remedy", fault_remedy(fault)}};
+  return {{"name", fault_names[static_cast<std::size_t>(fault)].second}, {"remedy", fault_remedy(fault)}};
 }
 
 nlohmann::json change_or_null(const std::optional<SurfaceChange>& change) {
@@ -81,7 +74,7 @@ nlohmann::json to_json(const RunState& state) {
           {"locked", text_or_null(state.locked)},
           {"fault", fault_or_null(state.fault)},
           {"change", change_or_null(state.change)},
-          {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}};
+          {"phase", safety_phase_names[static_cast<std::size_t>(state.phase)].second}};
 }
 
 nlohmann::json describe_model(const Body& body, const std::string& file) {

@@ -20,22 +20,6 @@ namespace {
 
 constexpr double second = 1e9;  // ns
 
-double length(const double (&v)[3]) {
-  return std::hypot(v[0], v[1], v[2]);
-}
-
-void note_largest(double value, double time, double& largest, double& largest_time) {
-  if (!(value > largest)) return;
-  largest = value;
-  largest_time = time;
-}
-
-std::string fault_name(Fault fault) {
-  for (const auto& [known, name] : fault_names)
-    if (known == fault) return name;
-  return fmt::format("fault {}", static_cast<int>(fault));
-}
-
 /// Formats "a=1\nb=2\n" as "a=1, b=2".
 std::string in_one_line(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
@@ -47,7 +31,8 @@ std::string in_one_line(std::string text) {
 std::string faults_text(const SessionSummary& summary) {
   std::string text;
   for (const SessionFault& fault : summary.faults)
-    text += fmt::format("{}{} at {:.3f} s", text.empty() ? "" : ", ", fault_name(fault.fault), fault.time);
+    text += fmt::format("{}{} at {:.3f} s", text.empty() ? "" : ", ",
+                        fault_names[static_cast<std::size_t>(fault.fault)].second, fault.time);
   return text.empty() ? "none" : text;
 }
 
@@ -74,7 +59,6 @@ Ending ending_of(const RecordingFile& recording, bool finish) {
 }
 
 void print_text(const RecordingFile& recording, const SessionSummary& s, Ending ending) {
-  const auto microseconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   const SessionInfo& info = recording.info();
   const std::size_t pictures = recording.pictures().size();
   say(stdout, "{}: {}, by {}\n", recording.path(), ending_names[static_cast<int>(ending)],
@@ -111,7 +95,8 @@ void print_text(const RecordingFile& recording, const SessionSummary& s, Ending 
 void print_json(const RecordingFile& recording, const SessionSummary& s, Ending ending) {
   auto faults = nlohmann::ordered_json::array();
   for (const SessionFault& fault : s.faults)
-    faults.push_back({{"fault", fault_name(fault.fault)}, {"time_s", fault.time}});
+    faults.push_back(
+        {{"fault", fault_names[static_cast<std::size_t>(fault.fault)].second}, {"time_s", fault.time}});
   nlohmann::ordered_json status;
   for (std::size_t k = 0; k < status_names.size(); ++k) status[status_names[k].second] = s.status_ticks[k];
   const SessionInfo& info = recording.info();
@@ -163,10 +148,11 @@ void Summarising::add(const TickRecord& tick) {
   for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
     if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary_.status_ticks[bit];
   }
-  summary_.best_effort.add(static_cast<StepStatus>(tick.status), length(tick.force), tick.force_error,
-                           tick.left_out, tick.time);
-  note_largest(length(tick.force), tick.time, summary_.largest_force, summary_.largest_force_time);
-  note_largest(length(tick.shown_force), tick.time, summary_.largest_shown, summary_.largest_shown_time);
+  const double force = Vec3(tick.force).stableNorm(), shown = Vec3(tick.shown_force).stableNorm();
+  summary_.best_effort.add(static_cast<StepStatus>(tick.status), force, tick.force_error, tick.left_out,
+                           tick.time);
+  note_largest(force, tick.time, summary_.largest_force, summary_.largest_force_time);
+  note_largest(shown, tick.time, summary_.largest_shown, summary_.largest_shown_time);
   summary_.worst_lateness = std::max<std::int64_t>(summary_.worst_lateness, tick.begun_ns - due(k));
   if (tick.begun_ns + tick.compute_ns > due(k + 1)) ++summary_.deadline_misses;
   summary_.compute.add(tick.compute_ns);

@@ -7,10 +7,9 @@
 #include <vector>
 
 #include "formats/recording.h"
-#include "runtime/loop/best_effort.h"
-#include "runtime/loop/histogram.h"
-#include "runtime/safety/fault.h"
 #include "runtime/core/tick/status.h"
+#include "runtime/loop/loop_report.h"
+#include "runtime/safety/fault.h"
 
 namespace palpate {
 
@@ -27,7 +26,7 @@ struct SessionSummary {
   double seconds = 0.0;              ///< from the start of the first tick to the end of the last one
   std::int64_t in_contact = 0;       ///< ticks in contact
   double largest_force = 0.0;        ///< largest contact force [N]
-  double largest_force_time = 0.0;   ///< [s]
+  double largest_force_time = 0.0;   ///< time of largest_force [s]
   double largest_shown = 0.0;        ///< largest force on the hand [N]
   double largest_shown_time = 0.0;   ///< [s]
   std::int64_t deadline_misses = 0;  ///< ticks that ended after the next one was due

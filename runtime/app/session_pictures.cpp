@@ -14,10 +14,6 @@ namespace {
 
 constexpr std::int64_t most_samples = 100'000;
 
-Vec3 vector_of(const double (&v)[3]) {
-  return {v[0], v[1], v[2]};
-}
-
 Eigen::Quaterniond quaternion_of(const double (&wxyz)[4]) {
   return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
 }
@@ -32,8 +28,8 @@ TickNote note_of(const TickRecord& tick, std::int64_t rate) {
   return {.number = number,
           .lateness_ns = tick.begun_ns - due,
           .compute_ns = tick.compute_ns,
-          .force = vector_of(tick.force),
-          .shown = vector_of(tick.shown_force).norm(),
+          .force = Vec3(tick.force),
+          .shown = Vec3(tick.shown_force).norm(),
           .depth = std::numeric_limits<double>::quiet_NaN(),  // is not recorded
           .contacts = tick.contacts,
           .status = static_cast<StepStatus>(tick.status),
@@ -84,12 +80,12 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
   picture.frame = pictures_.frame(frame);
   if (const std::optional<TickRecord> then = tick(picture.frame.tick)) {
     picture.device = {.orientation = quaternion_of(then->device_orientation),
-                      .position = vector_of(then->device_position),
+                      .position = Vec3(then->device_position),
                       .grab = then->grab != 0};
     picture.tool = {.orientation = quaternion_of(then->tool_orientation),
-                    .position = vector_of(then->tool_position),
+                    .position = Vec3(then->tool_position),
                     .grab = then->grab != 0};
-    picture.on_body = {.force = vector_of(then->force), .torque = vector_of(then->torque)};
+    picture.on_body = {.force = Vec3(then->force), .torque = Vec3(then->torque)};
     picture.status = static_cast<StepStatus>(then->status);
     picture.force_error = then->force_error;
     picture.left_out = then->left_out;

@@ -3,19 +3,9 @@
 #include <algorithm>
 #include <memory>
 
-#include "base/error.h"
 #include "base/json_text.h"
 
 namespace palpate {
-namespace {
-
-[[noreturn]] void refuse() {
-  throw Error("cannot be done with a recording", "palpate-runtime view",
-              "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
-}
-
-}  // namespace
-
 SessionView::SessionView(const std::filesystem::path& recording)
     : pictures_(recording), state_(pictures_.state(pictures_.times())) {}
 
@@ -42,25 +32,6 @@ void SessionView::seek(std::int64_t frame) {
 std::optional<RecordedFrame> SessionView::recorded_frame(std::int64_t frame) {
   const std::lock_guard lock(mutex_);
   return RecordedFrame{nearest(frame), pictures_.picture(nearest(frame))};
-}
-
-void SessionView::pause(bool) {
-  refuse();
-}
-void SessionView::step_once() {
-  refuse();
-}
-void SessionView::reset() {
-  refuse();
-}
-void SessionView::acknowledge() {
-  refuse();
-}
-void SessionView::change(const SettingsChange&) {
-  refuse();
-}
-void SessionView::record(bool) {
-  refuse();
 }
 
 std::int64_t SessionView::nearest(std::int64_t frame) const {

@@ -26,14 +26,6 @@ class SessionView : public ViewedRun {
 
   void seek(std::int64_t frame) override;
   std::optional<RecordedFrame> recorded_frame(std::int64_t frame) override;
-  void point(const PointerPose&) override {}
-  void lose_pointer() override {}
-  void pause(bool paused) override;
-  void step_once() override;
-  void reset() override;
-  void acknowledge() override;
-  void change(const SettingsChange& settings) override;
-  void record(bool on) override;
 
  private:
   [[nodiscard]] std::int64_t nearest(std::int64_t frame) const;

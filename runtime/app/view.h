@@ -1,4 +1,4 @@
-// palpate-runtime view: a recording in the viewer.
+// palpate-runtime view: recordings in a browser, or all that is in a folder.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// Serves a recording, or two side by side, until SIGINT or SIGTERM. Returns the exit code; throws Error.
-int view(const std::vector<std::filesystem::path>& recordings, ViewerOptions options);
+/// Serves one recording or two, or the gallery of a folder, until SIGINT, SIGTERM or SIGHUP. Returns the exit
+/// code; throws Error.
+int view(const std::vector<std::filesystem::path>& files, ViewerOptions options);
 
 }  // namespace palpate

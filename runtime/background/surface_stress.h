@@ -88,10 +88,10 @@ class SurfaceStress {
   std::vector<Index> parents_;       // FineSurface::parents as surface nodes
   std::vector<double> area_;         // [S]
   std::optional<SurfaceSides> sides_;            // sides of the facets
-  std::vector<Vec3> load_traction_;              // [their places]
+  std::vector<Vec3> load_traction_;              // [places of sides_]
   std::optional<SurfaceSides> fine_sides_;       // sides of the simplices, if refined
   std::optional<SideTractions> fine_tractions_;  // due to contact forces
-  std::vector<Vec3> fine_load_traction_;         // [their places]
+  std::vector<Vec3> fine_load_traction_;         // [places of fine_sides_]
   StressRows rows_;                              // [body's] due to displacement
   std::vector<std::size_t> first_of_force_;      // [body's + 1] begin of each node's entries below
   std::vector<Index> row_of_force_;              // node whose stress it changes

@@ -40,7 +40,7 @@ class Body : public ElasticBody {
     const auto node = static_cast<std::size_t>(mesh_node(stored));
     return model_.mesh.nodes[node] + model_.rest_displacement[node];
   }
-  /// [surface nodes of the body] their mesh nodes, ascending.
+  /// [surface nodes of the body] mesh nodes, ascending.
   [[nodiscard]] std::span<const Index> surface_mesh_nodes() const noexcept { return fine_.mesh_nodes; }
   /// The refined surface, by which the nodes of overlays on it are found.
   [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }

@@ -23,7 +23,7 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
   for (const Index local : local_nodes) {
     Index node = number[local];
     if (node < 0) {
-      // Mesh nodes are where the shape functions of one of them alone are not zero; held ones are not in Q.
+      // At a mesh node, one shape function alone is not zero; held mesh nodes are not in Q.
       node = static_cast<Index>(std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[local]) -
                                 of_body.begin());
     }
@@ -92,7 +92,7 @@ std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
   parts.response = H;
   parts.correction = M;
   if (offset.forces.size() > 0) {
-    const Eigen::VectorXd moved = greens * offset.forces;  // of Q, without the overlay
+    const Eigen::VectorXd moved = greens * offset.forces;  // displacement of Q without the overlay
     parts.offset_forces = offset.forces + M * moved;
     parts.offset = H * moved + offset.surface(dofs);
   }
@@ -103,7 +103,7 @@ std::size_t bytes_of(const CondensedPatch& condensed) noexcept {
   const auto entries =
       static_cast<std::size_t>(condensed.compliance.size() + condensed.T.size() + condensed.G.size());
   const auto dofs = static_cast<std::size_t>(condensed.T.rows() + condensed.T.cols());
-  return sizeof(double) * entries + sizeof(Index) * dofs;  // the indices by dofs: an upper bound
+  return sizeof(double) * entries + sizeof(Index) * dofs;  // one index per dof: an upper bound
 }
 
 }  // namespace palpate

@@ -17,7 +17,7 @@ namespace palpate {
 /// Displacement of a patch under no forces by the tangent of a nonlinear law (docs/overlays.md), added to the
 /// linear response.
 struct PatchOffset {
-  Eigen::VectorXd forces;  ///< [d g] that act on Q all the time [N]
+  Eigen::VectorXd forces;  ///< [d g] forces that always act on Q [N]
   Eigen::VectorXd
       surface;  ///< [d m] displacement of the surface, in the order of CondensedPatch::surface [m]
 };
@@ -31,18 +31,18 @@ std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
 /// Memory that a patch of this takes, at most [bytes].
 std::size_t bytes_of(const CondensedPatch& condensed) noexcept;
 
-/// The surface node (Body::simplices) that each of some local nodes on the surface is.
+/// Returns the surface nodes (Body::simplices) of local nodes on the surface.
 std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
                                    const std::vector<Index>& local_nodes);
 
-/// [g] stored nodes of a patch's nodes. Throws Error when one is not stored: the file keeps too few layers
-/// below the surface.
+/// Returns the [g] stored nodes of a patch's nodes. Throws Error if one is not stored because the file has
+/// too few layers below the surface.
 std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch);
 
-/// Xi at the blocks of some stored nodes [d m x d m].
+/// Returns Xi between some stored nodes [d m x d m].
 Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes);
 
-/// M = (I - G Xi_QQ)^-1 G, symmetric (theory.md section 4).
+/// Returns M = (I - G Xi_QQ)^-1 G, symmetric (theory.md section 4).
 Eigen::MatrixXd overlay_correction(const Eigen::MatrixXd& G, const Eigen::MatrixXd& greens);
 
 }  // namespace palpate

@@ -30,17 +30,14 @@ RecordedSurface surface_at_rest(const Model& model) {
   return surface;
 }
 
-double felt(const TickRecord& tick) {
-  return tick.force[0] * tick.force[0] + tick.force[1] * tick.force[1] + tick.force[2] * tick.force[2];
-}
-
 /// Returns the picture of the tick with the largest force, among ticks that have one.
 std::int64_t telling_picture(const RecordingFile& recording) {
   double largest = -1.0, time = 0.0;
   for (std::int64_t row = 0; row < recording.ticks(); ++row) {
     const TickRecord tick = recording.tick(row);
-    if (felt(tick) <= largest) continue;
-    largest = felt(tick);
+    const double felt = Vec3(tick.force).squaredNorm();
+    if (felt <= largest) continue;
+    largest = felt;
     time = tick.time;
   }
   const std::vector<PictureTime>& pictures = recording.pictures();

@@ -17,9 +17,14 @@ void copy_text(std::string_view text, char* to, std::size_t size) noexcept;
 /// Sets the result of this thread's last call that takes `error`.
 void set_last_code(int code) noexcept;
 
-/// Runs `work(code)`, which may set the `code` that a later failure has; it starts as PALPATE_ERROR_ARGUMENT.
-/// Returns PALPATE_OK, or the code with the reason in `error`. `place` is the function's name and
-/// `if_no_memory` a hint, as in handled_error.
+/// Why a session or recording could not be entered: there is none, or not now.
+inline int refused(const void* handle) noexcept {
+  return handle == nullptr ? -1 : PALPATE_ERROR_STATE;
+}
+
+/// Runs `work(code)`, which may set `code` to that of failures from then on; it begins as
+/// PALPATE_ERROR_ARGUMENT. Returns PALPATE_OK, or the code with the reason in `error`. `place` is the
+/// function and `if_no_memory` a hint, as in handled_error.
 template <typename Work>
 int tell_failure(const char* place, const char* if_no_memory, char* error, std::size_t error_size,
                  Work&& work) noexcept {

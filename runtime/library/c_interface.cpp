@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,23 +13,17 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/latest.h"
-#include "base/vectors.h"
 #include "formats/model_file.h"
-#include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/seen_contact.h"
-#include "runtime/background/surface_frames.h"
-#include "runtime/body/body.h"
+#include "runtime/core/tick/step.h"
 #include "runtime/library/c_error.h"
-#include "runtime/library/guarded.h"
+#include "runtime/library/own_loop.h"
 #include "runtime/library/palpate.h"
-#include "runtime/library/session_recording.h"
 #include "runtime/library/sized_struct.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/monotonic_clock.h"
-#include "runtime/core/tick/step.h"
 
 namespace palpate {
 namespace {
@@ -81,10 +74,6 @@ ToolPose to_pose(const palpate_pose& pose) noexcept {
   return {.orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
           .position = Eigen::Map<const Vec3>(pose.position),
           .grab = pose.grab != 0};
-}
-
-void copy(const Vec3& vector, double* xyz) noexcept {
-  std::copy_n(vector.data(), 3, xyz);
 }
 
 palpate_result to_result(const ToolState& state) noexcept {
@@ -202,107 +191,6 @@ bool can_become(const Tool& tool, const Tool& next) noexcept {
          is_bound(next.hand_over) && is_size(next.reach) && is_size(next.friction.value_or(0.0));
 }
 
-StateOptions with_room(StateOptions options, const Body& body, const palpate_overlay& overlay) {
-  if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, options.tools.size());
-  return options;
-}
-
-}  // namespace
-
-/// Result of a tick, for display.
-struct Shown {
-  SurfaceLoad load;
-  MotionSnapshot motion;
-};
-
-/// Stress and pressure at the surface nodes.
-struct FoundStress {
-  std::int64_t tick = -1;
-  std::vector<float> von_mises, pressure;  // [S] [Pa]
-};
-
-/// Contents of a palpate_session.
-struct OwnLoop {
-  OwnLoop(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
-          ContactModel contact, std::int64_t stress_ticks)
-      : file(std::move(name)),
-        state_options(options),
-        overlay_options(overlay),
-        body(std::move(model), {}, overlay.refinement, contact),
-        untouched(body, with_room(options, body, overlay)),
-        state(untouched),
-        poses(options.tools.size()),
-        shown(Shown{.load = state.surface.near.load(), .motion = MotionSnapshot(body)}),
-        stored_displacement(static_cast<std::size_t>(body.greens().order())),
-        displacement(body.surface_rest_positions().size()) {
-    publish();
-    if (overlay.refinement > 1)
-      overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = overlay.memory});
-    if (body.model().dynamics.method == DynamicsMethod::packed)
-      motion.emplace(body, state, MotionSourceOptions{});
-    if (stress_ticks > 0) {
-      frames.emplace(body, state, SurfaceFramesOptions{.ticks_per_frame = stress_ticks},
-                     [this](SurfacePicture picture) {
-                       stress.next() = {picture.frame.tick, std::move(picture.frame.von_mises),
-                                        std::move(picture.frame.pressure)};
-                       stress.publish();
-                     });
-    }
-  }
-
-  /// Passes the result of the last tick to the thread that draws.
-  void publish() noexcept {
-    Shown& next = shown.next();
-    next.load = state.surface.near.load();
-    state.surface.motion.snapshot(next.motion);
-    shown.publish();
-  }
-
-  void reset() noexcept {
-    state = untouched;
-    publish();
-  }
-
-  std::string file;
-  StateOptions state_options;
-  palpate_overlay overlay_options;
-  Body body;
-  State untouched;
-  State state;
-  std::vector<ToolPose> poses;
-  Latest<Shown> shown;
-  std::mutex drawing;                       // held by the thread that draws
-  std::vector<double> stored_displacement;  // workspace for drawing
-  std::vector<Vec3> displacement;
-  std::optional<PatchSource> overlays;
-  std::optional<MotionSource> motion;
-  std::int64_t ticks = 0;
-  Latest<FoundStress> stress{FoundStress{}};
-  std::optional<SurfaceFrames> frames;  // last member: its thread publishes the stress
-  std::optional<SessionRecording> recording;
-  std::size_t recorded_tool = 0;
-};
-
-}  // namespace palpate
-
-using namespace palpate;
-
-struct palpate_session : Guarded<OwnLoop> {
-  using Guarded::Guarded;
-};
-
-namespace {
-
-/// Enters a session as one of the threads that only read.
-Inside<OwnLoop> look(const palpate_session* session) noexcept {
-  return {const_cast<palpate_session*>(session), Use::shared};  // NOLINT: the guarded object is unchanged
-}
-
-/// Status code for a session that could not be entered.
-int refused(const palpate_session* session) noexcept {
-  return session == nullptr ? -1 : PALPATE_ERROR_STATE;
-}
-
 /// Returns the session of the thread that uses the functions of the loop. Throws Error if there is none.
 OwnLoop& expect(const Inside<OwnLoop>& loop, const palpate_session* session, const char* place, int& code) {
   if (loop) return *loop;
@@ -313,6 +201,9 @@ OwnLoop& expect(const Inside<OwnLoop>& loop, const palpate_session* session, con
 }
 
 }  // namespace
+}  // namespace palpate
+
+using namespace palpate;
 
 extern "C" {
 
@@ -497,61 +388,6 @@ int palpate_record_end(palpate_session* session, char* error, size_t error_size)
       throw Error(std::to_string(dropped) + " ticks or pictures found no room", place,
                   "record to a faster disk, or fewer pictures a second");
   });
-}
-
-int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) noexcept {
-  const Inside<OwnLoop> loop = look(session);
-  if (!loop) return refused(session);
-  const palpate_counts all{.size = sizeof(palpate_counts),
-                           .nodes = static_cast<int32_t>(loop->body.surface_rest_positions().size()),
-                           .simplices = static_cast<int32_t>(loop->body.surface_friction().size()),
-                           .corners = loop->body.dimension()};
-  return write_struct(all, counts) ? 0 : -1;
-}
-
-int palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {
-  const Inside<OwnLoop> loop = look(session);
-  if (!loop) return refused(session);
-  if (xyz == nullptr) return -1;
-  for (const Vec3& position : loop->body.surface_rest_positions()) {
-    copy(position, xyz);
-    xyz += 3;
-  }
-  return 0;
-}
-
-int palpate_surface_simplices(const palpate_session* session, int32_t* corners) noexcept {
-  const Inside<OwnLoop> loop = look(session);
-  if (!loop) return refused(session);
-  if (corners == nullptr) return -1;
-  std::copy(loop->body.simplices().begin(), loop->body.simplices().end(), corners);
-  return 0;
-}
-
-int palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
-  const Inside<OwnLoop> loop = look(session);
-  if (!loop) return refused(session);
-  if (xyz == nullptr) return -1;
-  const std::lock_guard lock(loop->drawing);
-  const Shown& shown = loop->shown.read();
-  surface_displacement(loop->body, shown.load, loop->stored_displacement, loop->displacement, &shown.motion);
-  for (const Vec3& u : loop->displacement) {
-    copy(u, xyz);
-    xyz += 3;
-  }
-  return 0;
-}
-
-int64_t palpate_surface_stress(palpate_session* session, float* von_mises, float* pressure) noexcept {
-  const Inside<OwnLoop> loop = look(session);
-  if (!loop) return -1;
-  const std::lock_guard lock(loop->drawing);
-  const FoundStress& found = loop->stress.read();
-  if (found.tick < 0) return -1;
-  const auto nodes = static_cast<std::ptrdiff_t>(loop->displacement.size());
-  if (von_mises != nullptr) std::copy_n(found.von_mises.begin(), nodes, von_mises);
-  if (pressure != nullptr) std::copy_n(found.pressure.begin(), nodes, pressure);
-  return found.tick;
 }
 
 }  // extern "C"

@@ -63,20 +63,6 @@ struct palpate_recording : Guarded<ReadRecording> {
   using Guarded::Guarded;
 };
 
-namespace {
-
-/// Enters a recording; any number of threads may.
-Inside<ReadRecording> look(const palpate_recording* recording) noexcept {
-  return {const_cast<palpate_recording*>(recording), Use::shared};  // NOLINT: the guarded object is unchanged
-}
-
-/// Status code for a recording that could not be entered.
-int refused(const palpate_recording* recording) noexcept {
-  return recording == nullptr ? -1 : PALPATE_ERROR_STATE;
-}
-
-}  // namespace
-
 extern "C" {
 
 palpate_recording* palpate_recording_open(const char* file, char* error, size_t error_size) noexcept {

@@ -91,4 +91,10 @@ class Inside {
   T* value_;
 };
 
+/// As one of the threads that only look: what it guards is not changed.
+template <typename T>
+Inside<T> look(const Guarded<T>* guarded) noexcept {
+  return {const_cast<Guarded<T>*>(guarded), Use::shared};  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+}
+
 }  // namespace palpate

@@ -6,6 +6,10 @@
 
 namespace palpate {
 
+inline double microseconds(std::int64_t nanoseconds) noexcept {
+  return 1e-3 * static_cast<double>(nanoseconds);
+}
+
 /// Counts durations up to 1 s in steps of 1 ns below 1 us, and of at most 1/500 of the duration above; longer
 /// ones only as "longer". The boundaries 500 ns times a power of 2 are exact. Fixed memory of 88 kB,
 /// allocated at construction.

@@ -10,6 +10,7 @@
 #include "runtime/background/surface_frames.h"
 
 namespace palpate {
+
 std::string contact_table(const Body& body, const State& state) {
   std::string table(contacts_header);
   const std::span<const ContactPoint> contacts = state.contacts();
@@ -37,18 +38,21 @@ std::string contact_table(const Body& body, const State& state) {
   return table;
 }
 
-void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
+std::vector<Vec3> displacement_from_mesh(const Body& body, const State& state) {
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
   std::vector<Vec3> u(body.surface_rest_positions().size());
   MotionSnapshot motion(body);
   state.surface.motion.snapshot(motion);
   surface_displacement(body, state.surface.near.load(), stored, u, &motion);
-  const std::vector<Vec3> nodes = body.surface_in_mesh();
+  const std::vector<Vec3> mesh = body.surface_in_mesh();
+  for (std::size_t node = 0; node < u.size(); ++node)
+    u[node] = body.surface_rest_positions()[node] + u[node] - mesh[node];
+  return u;
+}
+
+void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
   std::vector<double> total;
-  for (std::size_t node = 0; node < u.size(); ++node) {
-    const Vec3 seen = body.surface_rest_positions()[node] + u[node] - nodes[node];
-    total.insert(total.end(), seen.begin(), seen.end());
-  }
+  for (const Vec3& u : displacement_from_mesh(body, state)) total.insert(total.end(), u.begin(), u.end());
   SurfacePicture picture;
   SurfaceFrames(body, state, {.ticks_per_frame = 1, .in_background = false}, [&](SurfacePicture shown) {
     picture = std::move(shown);
@@ -57,8 +61,8 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
   const std::vector<double> pressure(picture.frame.pressure.begin(), picture.frame.pressure.end());
   const std::vector<NodalField> fields = {
       {"displacement", 3, total}, {"von_mises", 1, von_mises}, {"pressure", 1, pressure}};
-  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(),
-            fields);
+  write_vtu(file, body.surface_in_mesh(), body.dimension() == 3 ? ElementType::tri3 : ElementType::line2,
+            body.simplices(), fields);
 }
 
 }  // namespace palpate

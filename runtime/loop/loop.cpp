@@ -5,10 +5,10 @@
 #include <ctime>
 #include <utility>
 
+#include "runtime/core/touch/contact_nodes.h"
 #include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/tick_record.h"
 #include "runtime/safety/monotonic_clock.h"
-#include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {
@@ -21,13 +21,7 @@ void sleep_until(std::int64_t due) noexcept {
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
 }
 
-void note_largest(double value, double time, double& largest, double& largest_time) noexcept {
-  if (!(value > largest)) return;
-  largest = value;
-  largest_time = time;
-}
-
-/// Implements run_loop.
+/// The loop over ticks: device, safety rules and requests of a person.
 class Loop {
  public:
   Loop(const LoopParts& parts, const LoopOptions& options)

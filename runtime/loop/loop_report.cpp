@@ -14,19 +14,14 @@ void add_each(std::array<std::int64_t, size>& counts, const std::array<std::int6
 
 void LoopReport::add(const LoopReport& later) {
   const double begun = static_cast<double>(ticks) / static_cast<double>(rate);  // [s]
-  const auto take_larger = [begun](double& value, double& time, double later_value, double later_time) {
-    if (!(later_value > value)) return;
-    value = later_value;
-    time = begun + later_time;
-  };
   if (later.largest_force > largest_force) {
     largest_force_depth = later.largest_force_depth;
     largest_force_stiffening = later.largest_force_stiffening;
   }
-  take_larger(largest_force, largest_force_time, later.largest_force, later.largest_force_time);
-  take_larger(largest_jump, largest_jump_time, later.largest_jump, later.largest_jump_time);
-  take_larger(largest_greens_error, largest_greens_error_time, later.largest_greens_error,
-              later.largest_greens_error_time);
+  note_largest(later.largest_force, begun + later.largest_force_time, largest_force, largest_force_time);
+  note_largest(later.largest_jump, begun + later.largest_jump_time, largest_jump, largest_jump_time);
+  note_largest(later.largest_greens_error, begun + later.largest_greens_error_time, largest_greens_error,
+               largest_greens_error_time);
   best_effort.add(later.best_effort, begun);
   replay.add(later.replay, ticks, begun);
   ticks += later.ticks;

@@ -4,17 +4,24 @@
 #include <array>
 #include <cstdint>
 
+#include "runtime/core/tick/status.h"
 #include "runtime/loop/best_effort.h"
 #include "runtime/loop/histogram.h"
 #include "runtime/loop/replay_device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/core/tick/status.h"
 
 namespace palpate {
 
 inline constexpr std::int64_t default_rate = 1000;  ///< ticks per second
 
-/// Statistics of a run.
+/// Keeps the larger of two values, and when it was.
+inline void note_largest(double value, double time, double& largest, double& largest_time) noexcept {
+  if (!(value > largest)) return;
+  largest = value;
+  largest_time = time;
+}
+
+/// Report of a run at its end.
 struct LoopReport {
   std::int64_t rate = default_rate;
   std::int64_t ticks = 0;
@@ -31,7 +38,7 @@ struct LoopReport {
   double largest_jump = 0.0;               ///< largest change of the force between two ticks [N]
   double largest_jump_time = 0.0;          ///< time of the second of these ticks [s]
   double largest_greens_error = 0.0;       ///< largest ToolState::greens_error [N]
-  double largest_greens_error_time = 0.0;  ///< [s]
+  double largest_greens_error_time = 0.0;  ///< time of largest_force [s]
   double largest_shown = 0.0;              ///< largest force displayed by the device [N]
   std::array<std::int64_t, status_names.size()>
       status_ticks{};  ///< ticks with each status bit, in the order of status_names

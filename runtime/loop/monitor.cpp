@@ -21,10 +21,6 @@ constexpr auto pause = std::chrono::milliseconds(20);
 constexpr int pauses_a_line = 25;         // half a second
 constexpr std::size_t most_notes = 8192;  // queued ticks: more than a second of the fastest loop
 
-double microseconds(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds) * 1e-3;
-}
-
 sigset_t acknowledging_signal() {
   sigset_t signals;
   sigemptyset(&signals);

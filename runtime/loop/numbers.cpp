@@ -31,16 +31,20 @@ std::optional<double> parse_number(std::string_view text) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
-std::optional<std::vector<double>> parse_vector(std::string_view text) {
-  const std::vector<std::string_view> parts = split_commas(text);
-  if (parts.size() != 2 && parts.size() != 3) return std::nullopt;
-  std::vector<double> vector;
-  for (const std::string_view part : parts) {
+std::optional<std::vector<double>> parse_numbers(std::string_view text) {
+  std::vector<double> numbers;
+  for (const std::string_view part : split_commas(text)) {
     const std::optional<double> value = parse_number(part);
     if (!value) return std::nullopt;
-    vector.push_back(*value);
+    numbers.push_back(*value);
   }
-  return vector;
+  return numbers;
+}
+
+std::optional<std::vector<double>> parse_vector(std::string_view text) {
+  auto numbers = parse_numbers(text);
+  if (numbers && numbers->size() != 2 && numbers->size() != 3) numbers.reset();
+  return numbers;
 }
 
 std::optional<Index> parse_index(std::string_view text) {
@@ -56,6 +60,11 @@ std::vector<std::string_view> split_commas(std::string_view text) {
     begin = end + 1;
   }
   return parts;
+}
+
+NamedText split_named(std::string_view part) {
+  const std::size_t equals = std::min(part.find('='), part.size());
+  return {part.substr(0, equals), part.substr(std::min(equals + 1, part.size()))};
 }
 
 }  // namespace palpate

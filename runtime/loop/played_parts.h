@@ -1,8 +1,10 @@
 // Sessions of a run that was restarted.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -22,7 +24,25 @@ class PlayedParts {
     std::int64_t dropped = 0;         ///< ticks missing from the recording
   };
 
-  void add(const Part& part, const LoopReport& report);
+  void add(const Part& part, const LoopReport& report) {
+    if (rows_.empty()) report_.rate = report.rate;
+    if (rows_.size() < most_rows) {
+      rows_.push_back(
+          {.part = part, .begun = static_cast<double>(report_.ticks) / static_cast<double>(report_.rate)});
+      rows_.back().part.dropped = 0;
+    }
+    Row& row = rows_.back();
+    ++row.sessions;
+    row.part.dropped += part.dropped;
+    row.ticks += report.ticks;
+    row.ticks_in_contact += report.ticks_in_contact;
+    row.misses += report.deadline_misses;
+    row.faults += std::accumulate(report.faults.begin(), report.faults.end(), std::int64_t{0});
+    row.largest_force = std::max(row.largest_force, report.largest_force);
+    row.largest_shown = std::max(row.largest_shown, report.largest_shown);
+    dropped_ += part.dropped;
+    report_.add(report);
+  }
 
   /// Sum of all sessions; times are those of the run, without the gaps between sessions.
   [[nodiscard]] const LoopReport& report() const noexcept { return report_; }
@@ -38,6 +58,8 @@ class PlayedParts {
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
 
  private:
+  static constexpr std::size_t most_rows = 10'000;
+
   LoopReport report_;
   std::int64_t dropped_ = 0;
   std::vector<Row> rows_;

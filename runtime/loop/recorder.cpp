@@ -36,14 +36,6 @@ constexpr std::array<std::pair<DeviceEvent, const char*>, 6> event_texts = {{
     {DeviceEvent::resumed, "the run goes on after a pause"},
 }};
 
-/// Formats an entry: "phase: active".
-template <class Names>
-std::string named(const char* what, const Names& names, std::uint8_t number) {
-  for (const auto& [known, name] : names)
-    if (static_cast<std::uint8_t>(known) == number) return std::string(what) + ": " + name;
-  return what;
-}
-
 }  // namespace
 
 std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept {
@@ -112,8 +104,8 @@ void Recorder::note_events(const TickRecord& tick) {
   const auto begun = static_cast<DeviceEvent>(tick.event & ~last_.event);
   for (const auto& [event, text] : event_texts)
     if (has(begun, event)) say(text);
-  if (tick.phase != last_.phase) say(named("phase", safety_phase_names, tick.phase));
-  if (tick.fault != last_.fault) say(named("fault", fault_names, tick.fault));
+  if (tick.phase != last_.phase) say(std::string("phase: ") + safety_phase_names.at(tick.phase).second);
+  if (tick.fault != last_.fault) say(std::string("fault: ") + fault_names.at(tick.fault).second);
   last_ = tick;
 }
 

@@ -28,27 +28,23 @@ constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::inf
                                            "greater than 0, or inf"};
 constexpr bool protects_hand = true;
 
-constexpr double usual_edge = 0.1;  // [radius] default rounding of a disc's edge
-
-/// Part NAME=VALUE of a setting.
-struct Part {
-  std::string_view name;
-  std::string_view value;
-};
-
-Part split_part(std::string_view part) {
-  const std::size_t equals = std::min(part.find('='), part.size());
-  return {part.substr(0, equals), part.substr(std::min(equals + 1, part.size()))};
-}
-
 [[noreturn]] void refuse(std::string_view name, const std::string& what, const std::string& hint) {
   throw Error(what, "--" + std::string(name), hint);
 }
+
+/// One of some values that have names.
+template <class Value>
+concept Named = requires(Value value) {
+  { name_of(value) } -> std::convertible_to<std::string>;
+};
 
 // Text form of each kind of setting.
 
 std::string text_of(const auto& value) {
   return fmt::format("{}", value);
+}
+std::string text_of(const Named auto& value) {
+  return name_of(value);
 }
 std::string text_of(std::size_t bytes) {
   return std::to_string(bytes >> 20);
@@ -61,20 +57,8 @@ std::string text_of(const Tool& tool) {
 std::string text_of(ContactModel contact) {
   return contact == ContactModel::dynamic ? "dynamic" : "quasi-static";
 }
-std::string text_of(LiveLaw law) {
-  return name_of(law);
-}
-std::string text_of(Integrator integrator) {
-  return name_of(integrator);
-}
-std::string text_of(SolverKind kind) {
-  return name_of(kind);
-}
 std::string text_of(bool yes) {
   return yes ? "yes" : "no";
-}
-std::string text_of(PatchLaw law) {
-  return name_of(law);
 }
 std::string text_of(const OverlayOptions& overlay) {
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
@@ -185,15 +169,11 @@ void read_value(const Setting& setting, const std::string& text, Vec3& place) {
 }
 
 void read_value(const Setting& setting, const std::string& text, AxisBox& box) {
-  std::size_t middle = 0;
-  for (int commas = 0; commas < 3 && middle != std::string::npos; ++commas)
-    middle = text.find(',', commas == 0 ? 0 : middle + 1);
-  const auto low = parse_vector(text.substr(0, middle)),
-             high = middle == std::string::npos ? std::nullopt : parse_vector(text.substr(middle + 1));
-  if (!low || !high || low->size() != 3 || high->size() != 3)
+  const std::optional<std::vector<double>> numbers = parse_numbers(text);
+  if (!numbers || numbers->size() != 6)
     refuse(setting.name, "'" + text + "' is not two corners X,Y,Z,X,Y,Z",
            "write for instance 0,0,0,0.2,0.2,0.1");
-  box = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
+  box = {Vec3(numbers->data()), Vec3(numbers->data() + 3)};
 }
 
 void read_value(const Setting&, const std::string& text, std::string& axes) {
@@ -441,7 +421,7 @@ SettingsText split_settings(std::string_view lines) {
   SettingsText settings;
   while (!lines.empty()) {
     const std::size_t end = std::min(lines.find('\n'), lines.size());
-    const Part line = split_part(lines.substr(0, end));
+    const NamedText line = split_named(lines.substr(0, end));
     lines.remove_prefix(std::min(end + 1, lines.size()));
     if (find_setting(line.name) != nullptr) settings.emplace(line.name, line.value);
   }
@@ -452,127 +432,6 @@ std::string to_text(const Settings& settings) {
   std::string text;
   for_each_setting(settings, [&](const Setting& setting, const auto& value) {
     if (setting.is_told) text += fmt::format("{}={}\n", setting.name, text_of(value));
-  });
-  return text;
-}
-
-WorkspaceOptions Settings::workspace() const {
-  return {.device_origin = Vec3::Zero(),
-          .body_origin = origin.value_or(Vec3::Zero()),
-          .axes = parse_axes(axes),
-          .motion_scale = motion_scale,
-          .force_scale = force_scale};
-}
-
-BodyOptions Settings::body() const {
-  return {.refinement = overlay ? overlay->refinement : 1,
-          .overlay_law = overlay_law,
-          .contact = contact,
-          .load_scale = load_scale,
-          .stiffness_scale = stiffness_scale,
-          .live = live,
-          .warp = warp};
-}
-
-Tool parse_shape(const std::string& text) {
-  Tool tool;
-  if (text == "point") return tool;
-  const std::string_view rest = std::string_view(text).substr(std::min(text.find(':') + 1, text.size()));
-  const std::vector<std::string_view> sizes = split_commas(rest);
-  const bool sphere = text.starts_with("sphere:") && sizes.size() == 1;
-  const bool capsule = text.starts_with("capsule:") && sizes.size() == 2;
-  const bool disc = text.starts_with("disc:") && (sizes.size() == 1 || sizes.size() == 2);
-  if (!sphere && !capsule && !disc) {
-    throw Error(
-        "'" + text + "' is none of point, sphere:RADIUS, capsule:RADIUS,LENGTH and disc:RADIUS[,EDGE]",
-        "--tool", "lengths are metres");
-  }
-  const auto size = [&](std::string_view number) {
-    const std::optional<double> metres = parse_number(number);
-    if (metres && *metres > 0.0) return *metres;
-    throw Error(fmt::format("'{}' of '{}' is not a positive number of metres", number, text), "--tool",
-                "write for instance sphere:0.005");
-  };
-  if (disc) {
-    tool.disc_radius = size(sizes[0]);
-    tool.radius = sizes.size() == 2 ? size(sizes[1]) : usual_edge * tool.disc_radius;
-    if (tool.radius <= tool.disc_radius) return tool;
-    throw Error(fmt::format("the edge of '{}' is rounded by more than the radius", text), "--tool",
-                "write for instance disc:0.01,0.001");
-  }
-  tool.radius = size(sizes[0]);
-  if (capsule) tool.length = size(sizes[1]);
-  return tool;
-}
-
-OverlayOptions parse_overlay(const std::string& text, const std::string& where) {
-  OverlayOptions overlay;
-  for (const std::string_view part : split_commas(text)) {
-    const auto [name, number] = split_part(part);
-    const std::optional<Index> value = parse_index(std::string(number));
-    if (name == "r" && value && *value >= least_refinement && *value <= most_refinement) {
-      overlay.refinement = *value;
-    } else if (name == "rings" && value && *value >= 1 && *value <= most_rings) {
-      overlay.rings = *value;
-    } else {
-      throw Error(fmt::format("'{}' is neither r={} to r={} nor rings=1 to rings={}", part, least_refinement,
-                              most_refinement, most_rings),
-                  where, "write for instance r=3,rings=2");
-    }
-  }
-  return overlay;
-}
-
-Eigen::Quaterniond parse_axes(const std::string& text) {
-  const std::string hint = "write three of x, y, z, -x, -y, -z, each axis once, for instance x,-z,y";
-  const std::vector<std::string_view> names = split_commas(text);
-  if (names.size() != 3) throw Error("'" + text + "' is not three axes", "--axes", hint);
-  Mat3 axes = Mat3::Zero();
-  for (Eigen::Index column = 0; column < 3; ++column) {
-    std::string_view name = names[static_cast<std::size_t>(column)];
-    const double sign = name.starts_with('-') ? -1.0 : 1.0;
-    if (name.starts_with('-') || name.starts_with('+')) name.remove_prefix(1);
-    if (name.size() != 1 || name[0] < 'x' || name[0] > 'z')
-      throw Error("'" + text + "' is not three axes", "--axes", hint);
-    axes(name[0] - 'x', column) = sign;
-  }
-  const double determinant = axes.determinant();
-  if (determinant < 0.0)
-    throw Error("'" + text + "' is a mirror image", "--axes", "turn the sign of one axis round");
-  if (determinant == 0.0) throw Error("'" + text + "' names an axis twice", "--axes", hint);
-  return Eigen::Quaterniond(axes);
-}
-
-SafetyOptions parse_safety(const std::string& text) {
-  SafetyOptions options;
-  if (text == "default") return options;
-  for (const std::string_view part : split_commas(text)) {
-    const auto [name, number] = split_part(part);
-    const std::optional<double> parsed = parse_number(number);
-    if (!parsed || *parsed < 0.0)
-      throw Error(fmt::format("'{}' is not NAME=NUMBER, from 0 on", part), "--safety",
-                  "write max_force=2,ramp=3");
-    bool known = false;
-    for_each_safety_field(options, [&, name = name, bound = *parsed](const SafetyField& field, auto& value) {
-      if (name != field.name) return;
-      known = true;
-      value = static_cast<std::remove_reference_t<decltype(value)>>(std::min(bound, field.range.high));
-      if (!field.range.contains(bound) || value != bound)
-        throw Error(fmt::format("{} must be {}, not {}", name, field.range.words, bound), "--safety",
-                    "palpate-runtime play --help lists the bounds");
-    });
-    if (!known)
-      throw Error(fmt::format("there is no safety option '{}'", name), "--safety",
-                  "palpate-runtime play --help lists them");
-  }
-  return options;
-}
-
-std::string safety_help() {
-  std::string text;
-  const SafetyOptions defaults;
-  for_each_safety_field(defaults, [&](const SafetyField& field, const auto& value) {
-    text += fmt::format("    {:<16} {:>7} {:<6} {}\n", field.name, value, field.unit, field.meaning);
   });
   return text;
 }

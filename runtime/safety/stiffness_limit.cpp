@@ -1,7 +1,6 @@
 #include "runtime/safety/stiffness_limit.h"
 
 #include <Eigen/Eigenvalues>
-#include <limits>
 
 #include "runtime/safety/plausible.h"
 
@@ -15,11 +14,6 @@ Mat3 limited_stiffness(const Mat3& stiffness, double most) noexcept {
   const Vec3 values = eigen.eigenvalues();
   if (!vectors.allFinite() || !values.allFinite()) return Mat3::Zero();
   return vectors * values.cwiseMax(0.0).cwiseMin(most).asDiagonal() * vectors.transpose();
-}
-
-double coupling_stiffness(double most, double body) noexcept {
-  if (body <= most) return std::numeric_limits<double>::infinity();
-  return 1.0 / (1.0 / most - 1.0 / body);
 }
 
 }  // namespace palpate

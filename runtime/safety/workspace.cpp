@@ -61,14 +61,4 @@ DeviceCommand Workspace::in_device(const DeviceCommand& body) const noexcept {
   return device;
 }
 
-DeviceLimits Workspace::in_body(const DeviceLimits& device) const noexcept {
-  const double s = options_.motion_scale;
-  const double c = options_.force_scale;
-  return {.max_force = device.max_force / c,
-          .max_torque = device.max_torque * s / c,
-          .max_stiffness = device.max_stiffness / (s * c),
-          .max_damping = device.max_damping / (s * c),
-          .workspace_radius = device.workspace_radius * s};
-}
-
 }  // namespace palpate

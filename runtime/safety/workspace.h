@@ -35,10 +35,6 @@ class Workspace {
   /// Returns wrench and local model for the hand, from the body's.
   [[nodiscard]] DeviceCommand in_device(const DeviceCommand& body) const noexcept;
 
-  /// Returns the limits in the body's units that keep the device within its own: force F / c, torque T s / c,
-  /// stiffness K / (s c), damping B / (s c), radius s r.
-  [[nodiscard]] DeviceLimits in_body(const DeviceLimits& device) const noexcept;
-
  private:
   WorkspaceOptions options_;
   Mat3 axes_;

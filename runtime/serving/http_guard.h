@@ -12,6 +12,7 @@ namespace palpate {
 
 using Response = boost::beast::http::response<boost::beast::http::string_body>;
 using RequestHeader = boost::beast::http::request_header<>;
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 
 /// Returns the same text as a std::string_view.
 [[nodiscard]] inline std::string_view text_view(boost::beast::string_view text) {

@@ -13,8 +13,6 @@
 
 namespace palpate {
 
-using Request = boost::beast::http::request<boost::beast::http::empty_body>;
-
 /// Subprotocol of the WebSocket.
 inline constexpr const char* subprotocol = "palpate.2";
 

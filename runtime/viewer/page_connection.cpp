@@ -18,9 +18,7 @@ using asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr std::uint32_t longest_request = 8192;          // header [bytes]
-constexpr auto request_time = 10s;                       // to receive a header
-constexpr auto response_time = 30s;                      // for the client to read an answer
+constexpr auto handshake_time = 10s;
 constexpr auto idle_time = 30s;                          // a ping is sent after half of it
 constexpr auto stall_time = 10s;                         // for the page to read a message
 constexpr std::size_t most_unread = 32U << 20U;          // [bytes] queued texts
@@ -30,62 +28,36 @@ constexpr std::size_t longest_reason = 120;              // bytes that fit into 
 
 }  // namespace
 
-void PageConnection::start() {
+PageConnection::PageConnection(tcp::socket socket, const Served& served)
+    : Connection(std::move(socket)), served_(served), picture_timer_(stream_.get_executor()) {
   ErrorCode ignored;
   stream_.socket().set_option(tcp::no_delay(true), ignored);
   stream_.socket().set_option(asio::socket_base::send_buffer_size(send_buffer), ignored);
-  parser_.emplace();
-  parser_->header_limit(longest_request);
-  stream_.expires_after(request_time);
-  http::async_read_header(stream_, buffer_, *parser_,
-                          [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
-                            if (problem) return self->server_.leave(*self);
-                            self->answer_request();
-                          });
 }
 
 void PageConnection::answer_request() {
-  const Request& request = parser_->get();
-  if (std::optional<Response> refused = refusal(request, server_.served())) {
-    return respond(std::move(*refused));
-  }
-  if (wants_book(request)) return respond(book_answer(request, server_.served().book));
-  if (!server_.has_room()) return respond(full_house());
-  if (wants_proof(request)) return respond(proof_answer(request, server_.served()));
+  const ServedAddress& address = served_.address;
+  if (std::optional<Response> refused = refusal(request(), address)) return respond(std::move(*refused));
+  if (wants_book(request())) return respond(book_answer(request(), address.book));
+  if (!reception().has_room()) return respond(full_house());
+  if (wants_proof(request())) return respond(proof_answer(request(), address));
   is_admitted_ = true;
-  run_ = &server_.run(run_of(request, server_.served()));
-  if (wants_socket(request, server_.served())) {
-    open_socket();
-  } else {
-    respond(answer(request, server_.served(), run_->broadcast().picture()));
-  }
+  run_ = served_.runs[run_of(request(), address)].get();
+  if (wants_socket(request(), address)) return open_socket();
+  respond(answer(request(), address, run_->broadcast().picture()));
 }
 
-void PageConnection::respond(Response response) {
-  stream_.expires_after(response_time);
-  const auto done = [self = shared_from_this()](const ErrorCode&, std::size_t) {
-    ErrorCode ignored;
-    self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    self->server_.leave(*self);
-  };
-  if (parser_->get().method() == http::verb::head) {
-    header_.emplace(std::move(response.base()));
-    header_->content_length(response.body().size());
-    http::async_write(stream_, *header_, done);
-  } else {
-    response_.emplace(std::move(response));
-    response_->prepare_payload();
-    http::async_write(stream_, *response_, done);
-  }
+void PageConnection::leave() {
+  if (run_ != nullptr) run_->leave(*this);
+  Connection::leave();
 }
 
 void PageConnection::open_socket() {
-  const Request& request = parser_->get();
-  const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
+  const bool offers = request().count(http::field::sec_websocket_protocol) > 0;
   stream_.expires_never();  // the WebSocket has timeouts of its own
   socket_.emplace(std::move(stream_));
   websocket::stream_base::timeout times{};
-  times.handshake_timeout = request_time;
+  times.handshake_timeout = handshake_time;
   times.idle_timeout = idle_time;
   times.keep_alive_pings = true;
   socket_->set_option(times);
@@ -95,23 +67,23 @@ void PageConnection::open_socket() {
   socket_->read_message_max(longest_page_word);
   socket_->auto_fragment(false);
   buffer_.clear();
-  socket_->async_accept(request, [self = shared_from_this()](const ErrorCode& problem) {
-    if (problem) return self->server_.leave(*self);
-    self->is_open_ = true;
-    self->ticks_ = self->run_->is_replay() ? 0 : self->run_->broadcast().ticks().end();
-    self->run_->join(*self);
-    self->read();
+  socket_->async_accept(request(), [this, self = shared_from_this()](const ErrorCode& problem) {
+    if (problem) return leave();
+    is_open_ = true;
+    ticks_ = run_->is_replay() ? 0 : run_->broadcast().ticks().end();
+    run_->join(*this);
+    read();
   });
 }
 
 void PageConnection::read() {
-  socket_->async_read(buffer_, [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
-    self->receive(problem);
+  socket_->async_read(buffer_, [this, self = shared_from_this()](const ErrorCode& problem, std::size_t) {
+    receive(problem);
   });
 }
 
 void PageConnection::receive(const ErrorCode& problem) {
-  if (problem) return server_.leave(*this);
+  if (problem) return leave();
   if (!is_open_) return;
   if (!socket_->got_text()) return close(websocket::close_code::unknown_data, "only text is read");
   const auto bytes = buffer_.data();
@@ -127,7 +99,7 @@ void PageConnection::receive(const ErrorCode& problem) {
 void PageConnection::close(websocket::close_code code, std::string reason) {
   if (!is_open_) return;
   is_open_ = false;
-  server_.leave(*this);
+  leave();
   reason.resize(std::min(reason.size(), longest_reason));
   socket_->async_close(websocket::close_reason(code, reason),
                        [self = shared_from_this()](const ErrorCode&) {});
@@ -161,10 +133,10 @@ void PageConnection::send_news() {
   writing_since_ = Clock::now();
   socket_->text(writing_.is_text);
   socket_->async_write(asio::buffer(*writing_.bytes),
-                       [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
-                         self->writing_ = {};
-                         if (problem) return self->server_.leave(*self);
-                         self->send_news();
+                       [this, self = shared_from_this()](const ErrorCode& problem, std::size_t) {
+                         writing_ = {};
+                         if (problem) return leave();
+                         send_news();
                        });
 }
 
@@ -257,8 +229,8 @@ Message PageConnection::next_picture() {
 void PageConnection::wait_for_picture() {
   if (picture_timer_.expiry() == picture_due_) return;  // already waiting
   picture_timer_.expires_at(picture_due_);
-  picture_timer_.async_wait([self = shared_from_this()](const ErrorCode& problem) {
-    if (!problem) self->send_news();
+  picture_timer_.async_wait([this, self = shared_from_this()](const ErrorCode& problem) {
+    if (!problem) send_news();
   });
 }
 

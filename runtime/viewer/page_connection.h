@@ -3,8 +3,6 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <cstdint>
@@ -12,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "runtime/serving/reception.h"
 #include "runtime/viewer/broadcast.h"
@@ -20,45 +19,29 @@
 
 namespace palpate {
 
-class PageConnection;
-
-/// Server as its connections see it, on its thread.
-class PageHost {
- public:
-  virtual ~PageHost() = default;
-
-  [[nodiscard]] virtual const ServedAddress& served() const noexcept = 0;
-  [[nodiscard]] virtual ShownRun& run(std::size_t number) = 0;
-  /// True if another connection with the token may be answered.
-  [[nodiscard]] virtual bool has_room() const = 0;
-  /// Removes a closed connection, with its control.
-  virtual void leave(PageConnection& page) = 0;
-};
-
 /// HTTP connection: one request, after which it may become a WebSocket, that is, a page. For the server's
 /// thread.
-class PageConnection : public Received, public Page, public std::enable_shared_from_this<PageConnection> {
+class PageConnection : public Connection, public Page {
  public:
-  /// `server` must outlive this.
-  PageConnection(boost::asio::ip::tcp::socket socket, PageHost& server)
-      : stream_(std::move(socket)), server_(server), picture_timer_(stream_.get_executor()) {}
+  /// Data that connections are served; must live as long.
+  struct Served {
+    ServedAddress address;
+    std::vector<std::unique_ptr<ShownRun>> runs;
+  };
 
-  void start() override;
+  PageConnection(boost::asio::ip::tcp::socket socket, const Served& served);
+
   void cut() override;
   void send_news() override;
   void say(std::string text) override;
   void look_alone(DrawnPicture picture, std::int64_t frame) override;
   void follow() override;
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept override;
-  /// Run that it asked for; null before it has shown the token.
-  [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   [[nodiscard]] bool is_stalled() const override;
 
  private:
-  using ErrorCode = boost::system::error_code;
-
-  void answer_request();
-  void respond(Response response);
+  void answer_request() override;
+  void leave() override;
   void open_socket();
   void read();
   void receive(const ErrorCode& problem);
@@ -69,14 +52,9 @@ class PageConnection : public Received, public Page, public std::enable_shared_f
   void note_picture(const Message& message);
   void wait_for_picture();
 
-  boost::beast::tcp_stream stream_;
   std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
-  PageHost& server_;
-  ShownRun* run_ = nullptr;
-  boost::beast::flat_buffer buffer_;
-  std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
-  std::optional<Response> response_;
-  std::optional<boost::beast::http::response<boost::beast::http::empty_body>> header_;
+  const Served& served_;
+  ShownRun* run_ = nullptr;  // that it asks for; null before it has shown the token
 
   bool is_open_ = false;
   std::deque<std::string> said_;

@@ -1,6 +1,5 @@
 #include "runtime/viewer/page_word.h"
 
-#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
@@ -15,11 +14,7 @@ constexpr double farthest = 1e6;  // [m]
 constexpr double quaternion_error = 0.01;
 constexpr std::int64_t most_frames = std::int64_t{1} << 53;  // largest exact integer of JavaScript
 
-constexpr std::array<const char*, 10> names = {"point",  "pause",  "step",    "reset", "acknowledge",
-                                               "change", "record", "control", "seek",  "follow"};
-static_assert(names.size() == std::variant_size_v<PageWord>);
-
-/// Reason why a word is invalid; used in this file only.
+/// Error in a word; only in here.
 struct Problem {
   std::string text;
 };
@@ -53,79 +48,71 @@ Eigen::Matrix<double, static_cast<int>(count), 1> numbers(const Json& object, co
   return result;
 }
 
-PointWord point(const Json& object) {
-  expect_members(object, {"position", "orientation", "grab", "lifted"});
-  PointWord word;
-  word.wanted.pose.position = numbers<3>(object, "position");
+PointerPose pointer(const Json& object) {
+  PointerPose wanted;
+  wanted.pose.position = numbers<3>(object, "position");
   const Eigen::Vector4d orientation = numbers<4>(object, "orientation");
   if (!(std::abs(orientation.norm() - 1.0) <= quaternion_error))
     throw Problem{"orientation is not a quaternion of length 1"};
-  word.wanted.pose.orientation.coeffs() = orientation.normalized();
-  word.wanted.pose.grab = boolean(object, "grab");
-  word.wanted.lifted = boolean(object, "lifted");
-  return word;
+  wanted.pose.orientation.coeffs() = orientation.normalized();
+  wanted.pose.grab = boolean(object, "grab");
+  wanted.lifted = boolean(object, "lifted");
+  return wanted;
 }
 
-ChangeWord change(const Json& object) {
-  expect_members(object, {"settings"});
-  const Json& settings = object.at("settings");
+SettingsChange change(const Json& settings) {
   if (!settings.is_object()) throw Problem{"settings is not an object"};
-  ChangeWord word;
+  SettingsChange change;
   for (const auto& [name, value] : settings.items()) {
-    if (value.is_null()) {
-      word.settings.emplace(name, std::nullopt);
-    } else if (value.is_string()) {
-      word.settings.emplace(name, value.get<std::string>());
-    } else {
+    if (!value.is_null() && !value.is_string())
       throw Problem{"settings has a value that is neither text nor null"};
-    }
+    change[name] = value.is_null() ? std::nullopt : std::optional(value.get<std::string>());
   }
-  return word;
+  return change;
 }
 
-SeekWord seek(const Json& object) {
-  expect_members(object, {"frame"});
-  const Json& frame = object.at("frame");
+std::int64_t frame_number(const Json& frame) {
   if (!frame.is_number_unsigned() || frame.get<std::uint64_t>() > static_cast<std::uint64_t>(most_frames))
     throw Problem{"frame is not a number of a frame"};
-  return {frame.get<std::int64_t>()};
+  return frame.get<std::int64_t>();
 }
 
 PageWord word_of(const Json& object) {
   if (!object.is_object()) throw Problem{"is not a JSON object"};
   const auto found = object.find("type");
   if (found == object.end() || !found->is_string()) throw Problem{"has no type"};
-  const auto& type = found->get_ref<const std::string&>();
-  if (type == "point") return point(object);
-  if (type == "change") return change(object);
-  if (type == "seek") return seek(object);
-  if (type == "pause") {
-    expect_members(object, {"paused"});
-    return PauseWord{boolean(object, "paused")};
+  PageWord word{.type = found->get<std::string>()};
+  const auto is = [&](const char* type, std::initializer_list<const char*> members) {
+    if (word.type != type) return false;
+    expect_members(object, members);
+    return true;
+  };
+  if (is("point", {"position", "orientation", "grab", "lifted"})) {
+    word.ask = [wanted = pointer(object)](ViewedRun& run) { run.point(wanted); };
+  } else if (is("change", {"settings"})) {
+    word.ask = [settings = change(object["settings"])](ViewedRun& run) { run.change(settings); };
+  } else if (is("seek", {"frame"})) {
+    word.frame = frame_number(object["frame"]);
+    word.ask = [frame = *word.frame](ViewedRun& run) { run.seek(frame); };
+  } else if (is("pause", {"paused"})) {
+    word.ask = [paused = boolean(object, "paused")](ViewedRun& run) { run.pause(paused); };
+  } else if (is("record", {"on"})) {
+    word.ask = [on = boolean(object, "on")](ViewedRun& run) { run.record(on); };
+  } else if (is("control", {"take"})) {
+    word.take = boolean(object, "take");
+  } else if (is("step", {})) {
+    word.ask = &ViewedRun::step_once;
+  } else if (is("reset", {})) {
+    word.ask = &ViewedRun::reset;
+  } else if (is("acknowledge", {})) {
+    word.ask = &ViewedRun::acknowledge;
+  } else if (!is("follow", {})) {
+    throw Problem{"has a type that is unknown"};
   }
-  if (type == "record") {
-    expect_members(object, {"on"});
-    return RecordWord{boolean(object, "on")};
-  }
-  if (type == "control") {
-    expect_members(object, {"take"});
-    return ControlWord{boolean(object, "take")};
-  }
-  if (type == "step" || type == "reset" || type == "acknowledge" || type == "follow") {
-    expect_members(object, {});
-    if (type == "follow") return FollowWord{};
-    if (type == "step") return StepWord{};
-    if (type == "reset") return ResetWord{};
-    return AcknowledgeWord{};
-  }
-  throw Problem{"has a type that is unknown"};
+  return word;
 }
 
 }  // namespace
-
-const char* name_of(const PageWord& word) noexcept {
-  return names[word.index()];
-}
 
 std::optional<PageWord> parse_page_word(std::string_view text, std::string& problem) {
   if (text.size() > longest_page_word) {

@@ -1,32 +1,17 @@
 #include "runtime/viewer/shown_run.h"
 
 #include <optional>
-#include <variant>
 
 #include "base/error.h"
 
 namespace palpate {
-namespace {
-
-/// Passes a page's message on to the run.
-struct Ask {
-  ViewedRun& run;
-  void operator()(const PointWord& word) const { run.point(word.wanted); }
-  void operator()(const PauseWord& word) const { run.pause(word.paused); }
-  void operator()(const StepWord&) const { run.step_once(); }
-  void operator()(const ResetWord&) const { run.reset(); }
-  void operator()(const AcknowledgeWord&) const { run.acknowledge(); }
-  void operator()(const ChangeWord& word) const { run.change(word.settings); }
-  void operator()(const RecordWord& word) const { run.record(word.on); }
-  void operator()(const ControlWord&) const {}  // between pages
-  void operator()(const SeekWord& word) const { run.seek(word.frame); }
-  void operator()(const FollowWord&) const {}  // for the page alone
-};
-
-}  // namespace
-
 void ShownRun::take_mail() {
-  Mail mail = mailbox_.take();
+  Mail mail;
+  {
+    const std::lock_guard lock(mutex_);
+    is_posted_ = false;
+    mail = std::exchange(mail_, {});
+  }
   if (mail.scene) broadcast_.set_scene(std::move(mail.scene));
   if (!mail.times.is_null()) broadcast_.set_times(std::move(mail.times));
   if (mail.state) broadcast_.set_state(std::move(*mail.state));
@@ -99,27 +84,25 @@ void ShownRun::show_alone(Page& page, std::int64_t frame) {
 }
 
 void ShownRun::obey(Page& page, const PageWord& word) {
-  if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
-  if (std::holds_alternative<FollowWord>(word)) return page.follow();
-  const char* name = name_of(word);
-  const auto* seek = std::get_if<SeekWord>(&word);
-  const bool looks_alone = is_replay_ && seek != nullptr && controller_ != &page;
+  if (word.type == "control") return hand_over(page, word.take);
+  if (word.type == "follow") return page.follow();
+  const bool looks_alone = is_replay_ && word.frame && controller_ != &page;
   if (controller_ != &page && !looks_alone) {
     page.say(error_word(
-        name, PageError(PageRefusal::control, "this page only watches", "",
-                        controller_ == nullptr ? "take control first" : "another page has control")));
+        word.type, PageError(PageRefusal::control, "this page only watches", "",
+                             controller_ == nullptr ? "take control first" : "another page has control")));
     return;
   }
   try {
     if (looks_alone) {
-      show_alone(page, seek->frame);
+      show_alone(page, *word.frame);
     } else {
-      std::visit(Ask{run_}, word);
+      word.ask(run_);
     }
   } catch (const Error& error) {
-    page.say(error_word(name, error));
+    page.say(error_word(word.type, error));
   } catch (const std::exception& error) {  // e.g. out of memory: the run goes on
-    page.say(error_word(name, Error(error.what(), "", "")));
+    page.say(error_word(word.type, Error(error.what(), "", "")));
   }
 }
 

@@ -2,18 +2,35 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "runtime/viewer/broadcast.h"
-#include "runtime/viewer/mailbox.h"
 #include "runtime/viewer/page_word.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/viewed_run.h"
 
 namespace palpate {
+
+/// Ticks and pictures shown of a run since the server's thread last looked.
+struct Mail {
+  struct Ticks {
+    std::vector<TickNote> notes;
+    std::int64_t stride = 1;
+  };
+
+  std::shared_ptr<const Scene> scene;
+  std::optional<DrawnPicture> picture;
+  std::deque<Ticks> ticks;
+  std::optional<StateWord> state;
+  nlohmann::json times;  ///< times from the last state that had any
+};
 
 /// Page as its run sees it.
 class Page {
@@ -42,10 +59,13 @@ class ShownRun {
   ShownRun(const ShownRun&) = delete;
   ShownRun& operator=(const ShownRun&) = delete;
 
-  /// Calls `put` with the mail; for any thread. Returns true if the server's thread must be woken.
+  /// `put` puts something into the mail, by any thread. True where it was empty: the server's thread is to be
+  /// woken.
   template <class Put>
   [[nodiscard]] bool post(Put&& put) {
-    return mailbox_.post(std::forward<Put>(put));
+    const std::lock_guard lock(mutex_);
+    put(mail_);
+    return !std::exchange(is_posted_, true);
   }
 
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
@@ -76,7 +96,9 @@ class ShownRun {
   std::set<Page*> open_;  // pages with an open WebSocket
   Page* controller_ = nullptr;
   std::uint64_t joined_ = 0;
-  Mailbox mailbox_;
+  std::mutex mutex_;  // guards the following
+  Mail mail_;
+  bool is_posted_ = false;
 };
 
 }  // namespace palpate

@@ -51,26 +51,29 @@ struct RecordedFrame {
   SurfacePicture picture;
 };
 
-/// Requests to a run, called by the server's thread; none waits for the loop. An invalid one throws Error,
-/// whose text the page shows.
+/// Called by the server's thread; no call waits for the loop. Those that can be wrong throw Error, whose text
+/// the page is shown. What is not overridden is refused, as it is by a recording.
 class ViewedRun {
  public:
   virtual ~ViewedRun() = default;
 
-  virtual void point(const PointerPose& wanted) = 0;
-  virtual void lose_pointer() = 0;  ///< the controlling page is gone
-  virtual void pause(bool paused) = 0;
-  virtual void step_once() = 0;  ///< one tick, while paused
-  virtual void reset() = 0;      ///< restores the untouched body
-  virtual void acknowledge() = 0;
-  virtual void change(const SettingsChange& settings) = 0;
-  virtual void record(bool on) = 0;
+  virtual void point(const PointerPose& /*wanted*/) {}
+  virtual void lose_pointer() {}  ///< the controlling page is gone
+  virtual void pause(bool /*paused*/) { refuse(); }
+  virtual void step_once() { refuse(); }  ///< one tick, while paused
+  virtual void reset() { refuse(); }      ///< restores the untouched body
+  virtual void acknowledge() { refuse(); }
+  virtual void change(const SettingsChange& /*settings*/) { refuse(); }
+  virtual void record(bool /*on*/) { refuse(); }
   virtual void seek(std::int64_t frame) = 0;  ///< in a replay only
   /// Returns the nearest frame of a replay, for a page that views it by itself; the other pages are
   /// unaffected. Empty if there is no replay.
-  virtual std::optional<RecordedFrame> recorded_frame(std::int64_t frame) {
-    static_cast<void>(frame);
-    return std::nullopt;
+  virtual std::optional<RecordedFrame> recorded_frame(std::int64_t /*frame*/) { return std::nullopt; }
+
+ private:
+  [[noreturn]] static void refuse() {
+    throw Error("cannot be done with a recording", "palpate-runtime view",
+                "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
   }
 };
 

@@ -99,7 +99,7 @@ void ElasticBody::measure_surface() {
       const double length = (surface_rest_[a] - surface_rest_[b]).norm();
       longest_surface_edge_ = std::max(longest_surface_edge_, length);
       around += length;
-      sum += length;  // a closed surface has each edge as often
+      sum += length;  // a closed surface counts each edge equally often
     }
     simplex_edges_.push_back(around / static_cast<double>(corners));
   }

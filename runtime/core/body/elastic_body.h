@@ -73,7 +73,7 @@ class ElasticBody {
 
   /// For errors.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  /// Green's functions of the static body; with dynamic contact K_bar^-1.
+  /// Green's functions of the static body; for dynamic contact K_bar^-1.
   [[nodiscard]] const Greens& greens() const noexcept { return *greens_; }
   [[nodiscard]] const std::shared_ptr<const Greens>& shared_greens() const noexcept { return greens_; }
   [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
@@ -87,26 +87,27 @@ class ElasticBody {
   /// d, dofs per node: 2 in the plane, 3 in space.
   [[nodiscard]] int dimension() const noexcept { return greens_->dimension(); }
 
-  /// Stored nodes on the surface that are free along every axis, in the order of their mesh nodes.
+  /// Stored surface nodes that are free along every axis, in the order of their mesh nodes.
   [[nodiscard]] const std::vector<Index>& free_surface_nodes() const noexcept { return surface_; }
 
-  /// The free surface node whose rest position is nearest to `point` [m], which must be finite. In the plane
-  /// the point's z is ignored.
+  /// Free surface node with the rest position nearest to `point` [m], which must be finite. In the plane the
+  /// point's z is ignored.
   [[nodiscard]] NearestNode nearest_surface_node(const Vec3& point) const noexcept;
 
-  [[nodiscard]] int refinement() const noexcept { return refinement_; }  ///< r, of the surface
-  /// Longest edge of the surface at rest [m]: no point of the surface is farther than that from a surface
+  [[nodiscard]] int refinement() const noexcept { return refinement_; }  ///< refinement r of the surface
+  /// Longest edge of the surface at rest [m]: each point of the surface is at most that far from a surface
   /// node.
   [[nodiscard]] double longest_surface_edge() const noexcept { return longest_surface_edge_; }
-  /// Mean length of the edges of the surface at rest [m].
+  /// Mean edge length of the surface at rest [m].
   [[nodiscard]] double mean_surface_edge() const noexcept { return mean_surface_edge_; }
 
-  /// Box around the surface at rest [m].
+  /// Bounding box of the surface at rest [m].
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const noexcept { return bounds_; }
 
-  /// The surface that a tool meets, with its own numbering of the nodes on it, held ones too; those of the
-  /// body come first:
-  /// [F * d] surface nodes of its simplices (triangles, in the plane lines), outward as in Model::surface.
+  /// Contact surface, with its own numbering of all nodes on it, held ones included; the body's own nodes
+  /// come first.
+  /// [F * d] surface nodes of its simplices (triangles, in the plane lines), oriented outward as in
+  /// Model::surface.
   [[nodiscard]] std::span<const Index> simplices() const noexcept { return simplices_; }
   /// [surface nodes of the body] their stored nodes, -1 for those that are held along every axis.
   [[nodiscard]] std::span<const Index> surface_stored_nodes() const noexcept { return surface_stored_nodes_; }
@@ -118,35 +119,35 @@ class ElasticBody {
   }
   /// True if a surface node can move along some axis.
   [[nodiscard]] bool surface_moves(Index node) const noexcept { return !surface_parts(node).stored.empty(); }
-  /// Most stored nodes that a surface node follows.
+  /// Largest number of stored nodes followed by a surface node.
   [[nodiscard]] Index most_surface_parts() const noexcept { return most_surface_parts_; }
-  /// Groups of neighbouring surface nodes; none of a refined surface, which is for overlays.
+  /// Groups of neighbouring surface nodes; none on a refined surface, which is for overlays.
   [[nodiscard]] const SurfaceAggregates& aggregates() const noexcept { return aggregates_; }
-  /// Runs of stored nodes by which the far surface is renewed.
+  /// Runs of stored nodes in which the far surface is updated.
   [[nodiscard]] const NodeRuns& runs() const noexcept { return runs_; }
-  /// Number of a group among the surface nodes: after all of them.
+  /// Node number of a group: groups are numbered after all surface nodes.
   [[nodiscard]] Index aggregate_node(Index group) const noexcept {
     return static_cast<Index>(surface_rest_.size()) + group;
   }
-  /// Group that a number stands for, -1 where it is a surface node's.
+  /// Group with a node number; -1 for the number of a surface node.
   [[nodiscard]] Index aggregate_of(Index node) const noexcept {
     return std::max<Index>(node - static_cast<Index>(surface_rest_.size()), -1);
   }
-  /// Surface nodes whose last part is a stored node: with it, all that they follow are known.
+  /// Surface nodes whose last part is `stored`: once it is known, so are all nodes that they follow.
   [[nodiscard]] std::span<const Index> followers(Index stored) const noexcept {
     const auto first = static_cast<std::size_t>(first_follower_[stored]);
     const auto end = static_cast<std::size_t>(first_follower_[static_cast<std::size_t>(stored) + 1]);
     return {followers_.data() + first, end - first};
   }
-  /// Surface node of a stored node, -1 when it is inside the body.
+  /// Surface node of a stored node; -1 if it is inside the body.
   [[nodiscard]] Index surface_node_of_stored(Index stored) const noexcept {
     return surface_node_of_stored_[stored];
   }
-  /// [S] where each rests [m].
+  /// [S] positions at rest [m].
   [[nodiscard]] std::span<const Vec3> surface_rest_positions() const noexcept { return surface_rest_; }
-  /// [F] Coulomb's coefficient of each simplex: that of the material of its element.
+  /// [F] Coulomb coefficient of each simplex, from its element's material.
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
-  /// [F] mean length of each simplex's edges at rest [m].
+  /// [F] mean edge length of each simplex at rest [m].
   [[nodiscard]] std::span<const double> simplex_edges() const noexcept { return simplex_edges_; }
 
  private:
@@ -172,7 +173,7 @@ class ElasticBody {
   std::vector<Index> first_follower_;  // [stored + 1]
   std::vector<Index> followers_;       // surface nodes
   std::vector<Index> surface_;         // free surface nodes
-  std::vector<double> x_, y_, z_;      // [those, padded to whole blocks with infinity] rest positions
+  std::vector<double> x_, y_, z_;      // [free surface nodes, padded with infinity] rest positions
   SurfaceAggregates aggregates_;
   NodeRuns runs_;
   std::vector<double> simplex_edges_;  // [F]

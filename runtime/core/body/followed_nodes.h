@@ -41,7 +41,7 @@ class FollowedNodes {
   /// Moves the parts of a place to one that follows none.
   void move(Index from, Index to) noexcept;
 
-  /// Takes all forces off.
+  /// Removes all forces.
   void unload() noexcept;
   /// Adds a force on the place to that of the stored node, by the part's weight [N].
   void load(const Part& part, const Vec3& force) noexcept;

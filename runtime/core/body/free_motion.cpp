@@ -309,7 +309,7 @@ void FreeMotion::note_strain(std::span<const double> displacement) noexcept {
       history_
           .strains[static_cast<std::size_t>(ticks_ - 2 + std::ssize(history_.loads)) % tuning.body.history];
   history_.strains[last] = strain_energy(history_.loads[last], dimension_, displacement);
-  // Motion under a contact is stilled, that of the return too.
+  // Motion under a contact is damped, including that of the return.
   history_.returned = std::max(
       0.0, std::exp(-tick_ / tuning.body.settling) * history_.returned + before - history_.strains[last]);
 }
@@ -331,20 +331,20 @@ void FreeMotion::let_go(const ElasticBody& body, const SurfaceLoad& load, std::s
     held_.fade = 1.0;
     held_.since_let_go = 0.0;
   } else {
-    // Without room for another: its energy is lost.
+    // No capacity for another release: its energy is lost.
     if (!history_.pending.force.add(last.nodes(), last.forces(), 1.0)) return;
     history_.pending.force.add(load.nodes(), load.forces(), -1.0);
     add_rate(last, grabs);
     add(displacement, 1.0, held_.pending);
   }
-  for (NodalLoad& before : history_.loads) {  // what is gone has no past for the next release
+  for (NodalLoad& before : history_.loads) {  // removed forces must not count in the next release
     before.clear();
     before.add(load.nodes(), load.forces(), 1.0);
   }
   history_.returned = 0.0;
   set_zero(history_.strains);
   active_ = true;
-  for (SurfaceNode& node : nodes_) node.stamp = -2;  // what `at` gave holds no longer
+  for (SurfaceNode& node : nodes_) node.stamp = -2;  // the values returned by `at` are invalid
   if (load.count == 0) {
     set_zero(displacement);
     return;

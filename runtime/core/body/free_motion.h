@@ -134,9 +134,9 @@ class FreeMotion {
   /// Forces of the last ticks, and the release that follows once they end.
   struct History {
     std::vector<NodalLoad> loads;  // [history]
-    std::vector<double> strains;   // [history] the body's energy under them [J]
-    double returned = 0.0;         // of it, what the body gave back of late [J]
-    LetGo pending;                 // not yet in the motion
+    std::vector<double> strains;   // [history] strain energies under them [J]
+    double returned = 0.0;         // strain energy released by the body recently [J]
+    LetGo pending;                 // release not yet in the motion
   };
   /// Displacement held fixed: until it enters the motion, and for modal dynamics the part not represented by
   /// modes.
@@ -151,7 +151,7 @@ class FreeMotion {
     std::vector<double> q_before;  // [k] at the beginning of the step
     std::vector<double> q_held;    // [k] the modes' part of what is held
     std::vector<double> shown;     // [k] modal coordinates of what is seen, but for what is held
-    std::vector<double> g, rate;   // [k] scratch
+    std::vector<double> g, rate;   // [k] workspace
   };
   /// Samples of a step beside the tick.
   struct Sampled {
@@ -160,9 +160,9 @@ class FreeMotion {
     bool is_near_limit = false;
     bool held_in_flight = false;    // what is held stays until a sample has it
     std::int64_t phase = 0;         // in which the sample came
-    std::vector<double> before, u;  // [n] samples between which the tick is
+    std::vector<double> before, u;  // [n] samples between which the tick lies
     double share = 1.0;             // of u
-    std::vector<double> untouched;  // [n] of a live body
+    std::vector<double> untouched;  // [n] empty unless live
   };
   struct SurfaceNode {
     std::int64_t stamp = -2;  // tick of the value
@@ -177,7 +177,7 @@ class FreeMotion {
   bool dynamic_contact_;
   bool active_;
   std::int64_t ticks_ = 0;
-  std::int64_t phase_ = 1;  // of the present step's ticks, the last one ends it
+  std::int64_t phase_ = 1;  // tick within the present step, from 1; the last one ends it
   History history_;
   Held held_;
   Modal modal_;

@@ -20,12 +20,10 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t cache_line = 64;
-constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
-constexpr std::size_t nodes_ahead =
-    4;  // of a slice of u, loaded nodes ahead of their use that rows are fetched
-constexpr std::int64_t u_chunk =
-    2048;  // doubles of u that stay in the first-level cache while all rows pass by
-constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
+constexpr std::int64_t tile = 64;           // scalars; two tiles of doubles fit into the L1 cache
+constexpr std::size_t nodes_ahead = 4;      // loaded nodes by which rows of a slice of u are prefetched
+constexpr std::int64_t u_chunk = 2048;      // doubles of u that stay in the L1 cache while all rows are read
+constexpr std::int64_t ahead_bytes = 1024;  // prefetch distance within a row
 
 /// Row length in whole cache lines, an odd number of them, so that equal columns of neighbouring rows do not
 /// map to the same cache set.

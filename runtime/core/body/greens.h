@@ -55,8 +55,8 @@ class Greens {
   /// Relative rounding error of a stored entry [-].
   [[nodiscard]] double rounding() const noexcept;
 
-  /// The block row of the capacitance matrix C = E^T Xi E (theory.md section 3) that belongs to `row`: its
-  /// blocks at `columns` one beside the other, `blocks` is d x dm, row-major, for m columns.
+  /// Computes the block row of the capacitance matrix C = E^T Xi E (theory.md section 3) for `row`: the
+  /// blocks at `columns` side by side. `blocks` is d x dm, row-major, for m columns.
   virtual void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept = 0;
 
   /// u = Xi E f (theory.md section 3) for ranges of nodes, one after the other in `u` [m], by the forces f
@@ -97,7 +97,7 @@ class Greens {
 std::shared_ptr<const Greens> make_greens(PackedGreens packed, int dimension,
                                           const GreensOptions& options = {});
 
-/// A matrix in nested low-rank form, which stays as it is.
+/// Matrix in nested low-rank form, used as it is.
 std::shared_ptr<const Greens> make_greens(std::shared_ptr<const HierarchicalMatrix> compressed);
 
 /// Adds terms to Green's functions, after the terms that they have already.

@@ -153,8 +153,8 @@ class NearField {
   struct Members {
     std::vector<Index> count;          // [capacity]
     std::vector<Index> node;           // [members x capacity] surface nodes
-    std::vector<double> weight;        // [as these]
-    std::vector<Eigen::Matrix3d> map;  // [as these]
+    std::vector<double> weight;        // [members x capacity] weights of the group's nodes
+    std::vector<Eigen::Matrix3d> map;  // [members x capacity] weights of the group's nodes
   };
   /// Coupling of places beside the patch with the patch.
   struct BesidePatch {
@@ -181,12 +181,12 @@ class NearField {
   std::int64_t revision_ = 0;
   std::vector<Index> place_;          // [S + groups]
   std::vector<Index> nodes_;          // [capacity] surface nodes
-  std::vector<std::int64_t> wanted_;  // [capacity] tick in which each was wanted last
+  std::vector<std::int64_t> wanted_;  // [capacity] last tick in which each was wanted
   LargeVector<double> C_;             // [d capacity x stride]
   std::vector<double> force_;         // [d capacity]
   std::vector<double> last_force_;    // [d capacity] before `unload`
   std::vector<double> displacement_;  // [d capacity]
-  std::vector<double> begun_;         // [d capacity] displacement at the tick's begin
+  std::vector<double> begun_;         // [d capacity] displacement at the beginning of the tick
   std::vector<double> last_motion_;   // [d capacity]
   std::vector<double> offset_;        // [d capacity] displacement without forces
   FollowedNodes followed_;            // by places beside the patch

@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-/// X = Xi_Q of forces on the node, and Y = M X.
+/// Computes X = Xi_Q for forces on the node, and Y = M X.
 void NearField::respond(const ElasticBody& body, Index place) noexcept {
   const std::span<const Index> Q = patch()->stored_nodes();
   const std::ptrdiff_t width = patch_dofs();
@@ -25,7 +25,8 @@ void NearField::respond(const ElasticBody& body, Index place) noexcept {
   }
 }
 
-/// C between a node and the first `count`, which are those before it and itself; for a group it may be more.
+/// Computes C between a node and the first `count` nodes, which are those before it and itself; for a group
+/// there may be more.
 void NearField::connect(const ElasticBody& body, Index place, Index count) noexcept {
   if (patch_place(place) >= 0) {
     connect_within_patch(place);
@@ -38,7 +39,7 @@ void NearField::connect(const ElasticBody& body, Index place, Index count) noexc
   const std::ptrdiff_t width = d * count;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis)
     std::copy_n(work_.blocks.data() + axis * width, width, C_.data() + (d * place + axis) * stride_);
-  // The node's columns go into each row at once: a row is a place in memory of its own.
+  // The node's columns are written into each row at once, as each row is in memory of its own.
   for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
     double* entries = C_.data() + dof * stride_ + d * place;
     for (std::ptrdiff_t axis = 0; axis < d; ++axis)
@@ -46,7 +47,7 @@ void NearField::connect(const ElasticBody& body, Index place, Index count) noexc
   }
 }
 
-/// From the members' rows: A^T C A of their maps A.
+/// Computes C from the members' rows: A^T C A with their maps A.
 void NearField::connect_by_members(Index place, Index count) noexcept {
   const std::ptrdiff_t d = dimension_;
   const std::ptrdiff_t width = d * count, after = d * (place + 1);

@@ -33,13 +33,13 @@ class Patch {
 
   /// [m] surface nodes of the body (ElasticBody::simplices), ascending.
   [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return parts_.surface_nodes; }
-  /// Elements of the body that it refines, ascending.
+  /// Refined elements of the body, ascending.
   [[nodiscard]] std::span<const Index> elements() const noexcept { return parts_.elements; }
   /// [g] stored nodes Q.
   [[nodiscard]] std::span<const Index> stored_nodes() const noexcept { return parts_.stored_nodes; }
 
-  /// Row [d m] of the compliance between surface nodes, T Xi_G,QQ T^T + K_L^-1 [m/N]: of dof d k + axis for
-  /// the k-th of them.
+  /// Row [d m] of the compliance between surface nodes, T Xi_G,QQ T^T + K_L^-1 [m/N], of dof d k + axis for
+  /// the k-th node.
   [[nodiscard]] const double* compliance(Index dof) const noexcept {
     return parts_.compliance.row(dof).data();
   }

@@ -49,7 +49,7 @@ class TurnedGreens final : public Greens {
     }
   }
 
-  /// In parts of forces and of nodes that fit on the stack.
+  /// Processes parts of the forces and nodes that fit on the stack.
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
     const auto d = static_cast<std::size_t>(dimension());

@@ -115,7 +115,7 @@ struct ManyTuning {
   float local_tolerance = 1e-4F;
   int fewest_steps = 16;  ///< GMRES steps
   int most_steps = 48;
-  double step_work = 6e6;  ///< multiplications of GMRES, between these bounds
+  double step_work = 6e6;  ///< multiplications of GMRES, between fewest and most steps
   float linear_tolerance = 0.01F;
   double gain = 0.7;       ///< [previous residual] a Newton step that gains less has failed
   double slipping = 1e-5;  ///< [1] a contact closer to the edge of the cone slips

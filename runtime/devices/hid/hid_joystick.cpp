@@ -1,11 +1,12 @@
-#include "runtime/devices/hid/hid_joystick.h"
-
+// HID protocol of a force-feedback joystick.
 #include <algorithm>
-#include <chrono>
-#include <thread>
+#include <array>
 
 #include "base/error.h"
+#include "runtime/devices/hid/make_hid_protocol.h"
+#include "runtime/devices/reports/pid_effects.h"
 #include "runtime/safety/monotonic_clock.h"
+#include "runtime/safety/velocity_estimator.h"
 
 namespace palpate {
 namespace {
@@ -25,107 +26,119 @@ Vec3 resolution(const PidLayout& layout, const PidConstants& constants) {
   return result;
 }
 
-bool same(const PidReport& a, const PidReport& b) noexcept {
-  return std::ranges::equal(a.span(), b.span());
-}
+/// Two constant effects play without end, so that the last force goes on when no report follows: such a
+/// device needs the guardian most. A report that equals the one before it is sent only every 0.1 s, as the
+/// bus carries one per millisecond.
+///
+/// Many sticks report only what has changed. One that rests is not silent, so its last report is repeated,
+/// with a new number, until it speaks: that it is gone is seen by reads and writes that fail, and that it
+/// hangs by numbers that are frozen while a force is shown.
+class HidJoystick : public HidProtocol {
+ public:
+  HidJoystick(const PidConstants& constants, const DeviceLimits& limits, const PidLayout& layout,
+              std::string device, std::uint32_t last)
+      : HidProtocol(limits),
+        constants_(constants),
+        layout_(layout),
+        device_(std::move(device)),
+        sequence_(last),
+        effects_(layout_, constants_),
+        velocity_(resolution(layout, constants)) {}
 
-OutputReport copy(const PidReport& report) {
-  return {report.span().begin(), report.span().end()};
-}
+  [[nodiscard]] std::size_t input_bytes() const noexcept override {
+    return std::size_t{layout_.axes[0].report_bytes} + (layout_.numbered ? 1 : 0);
+  }
+
+  /// Waiting time, shorter than the silence from which the force fades [ms].
+  [[nodiscard]] int wait() const noexcept override { return 3; }
+
+  /// Runs the PID start sequence. Throws Error with the step that the device failed.
+  void start(HidDevice& device) override {
+    const char* const failure = effects_.start(
+        {.output = [&](const PidReport& report) { return device.write(report.span()); },
+         .set_feature = [&](const PidReport& report) { return device.set_feature(report.span()); },
+         .get_feature =
+             [&](PidReport& report) {
+               const int size = device.get_feature({report.bytes.data(), report.size});
+               if (size >= 0) report.size = std::min(report.size, static_cast<std::size_t>(size));
+               return size >= 0;
+             }});
+    if (failure != nullptr) {
+      throw Error(failure, device_,
+                  "plug it in again and close other programs that use its forces; if it stays so, its "
+                  "firmware differs from PID");
+    }
+  }
+
+  bool take(std::span<const std::uint8_t> report) noexcept override {
+    const auto input = decode_pid_input(layout_, report);
+    if (!input) return false;
+    input_ = *input;
+    return true;
+  }
+
+  /// False only before the first report. The sequence number advances by the milliseconds between two
+  /// reports, so that no speed is computed from a repetition to a report.
+  bool tell(bool heard, std::int64_t now, DeviceState& state) noexcept override {
+    if (!heard && heard_ == 0) return false;
+    const std::int64_t since = now - heard_;
+    if (heard) {
+      sequence_ += static_cast<std::uint32_t>(std::clamp(since, millisecond, still_after) / millisecond);
+      heard_ = now;
+      state_ = pid_state(constants_, input_);
+      state_.velocity = velocity_.take(state_.pose.position, now);
+    } else {
+      ++sequence_;
+      if (since > still_after) state_.velocity.setZero();
+    }
+    state = state_;
+    state.sequence = sequence_;
+    return true;
+  }
+
+  void encode(const DeviceCommand& command, const DeviceState&, OutputReports& reports) noexcept override {
+    const auto forces = effects_.force(pid_force(constants_, command.wrench.force));
+    const std::int64_t now = monotonic_now();
+    for (std::size_t k = 0; k < pid_axes; ++k) {
+      const bool is_same = std::ranges::equal(forces[k].span(), sent_[k].report.span());
+      if (is_same && now - sent_[k].time < repeat_after) continue;
+      sent_[k] = {forces[k], now};
+      reports.add(forces[k].span());
+    }
+  }
+
+  /// Returns reports that set both forces to 0, stop both effects and reset the device.
+  [[nodiscard]] std::vector<OutputReport> zero() const override {
+    std::vector<OutputReport> reports;
+    for (const PidReport& report : effects_.stop())
+      reports.emplace_back(report.span().begin(), report.span().end());
+    return reports;
+  }
+
+ private:
+  PidConstants constants_;
+  PidLayout layout_;
+  std::string device_;
+  std::uint32_t sequence_;
+  PidEffects effects_;
+  PidInput input_;
+  VelocityEstimator velocity_;
+  DeviceState state_;       // state returned last
+  std::int64_t heard_ = 0;  // time of the last report; 0: none yet [ns]
+
+  struct Sent {
+    PidReport report;
+    std::int64_t time = 0;  // [ns]
+  };
+  std::array<Sent, pid_axes> sent_;
+};
 
 }  // namespace
 
-HidJoystick::HidJoystick(const PidConstants& constants, const DeviceLimits& limits, const PidLayout& layout,
-                         std::string device, std::uint32_t last)
-    : constants_(constants),
-      limits_(limits),
-      layout_(layout),
-      device_(std::move(device)),
-      sequence_(last),
-      effects_(layout_, constants_),
-      velocity_(resolution(layout, constants)) {}
-
-std::size_t HidJoystick::input_bytes() const noexcept {
-  return std::size_t{layout_.axes[0].report_bytes} + (layout_.numbered ? 1 : 0);
-}
-
-void HidJoystick::start(HidDevice& device) {
-  using Kind = PidRequest::Kind;
-  for (PidRequest request = effects_.next(); request.kind != Kind::none; request = effects_.next()) {
-    if (request.kind == Kind::get_feature) {
-      PidReport& report = request.report;
-      const int size = device.get_feature({report.bytes.data(), report.size});
-      if (size < 0) {
-        effects_.refused();
-      } else {
-        effects_.received(report.span().first(std::min(report.size, static_cast<std::size_t>(size))));
-      }
-      // Some devices need a moment to load an effect.
-      if (effects_.next().kind == Kind::get_feature)
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    } else if (request.kind == Kind::output ? device.write(request.report.span())
-                                            : device.set_feature(request.report.span())) {
-      effects_.done();
-    } else {
-      effects_.refused();
-    }
-  }
-  if (effects_.failure() != nullptr) {
-    throw Error(effects_.failure(), device_,
-                "plug it in again and close other programs that use its forces; if it stays so, its firmware "
-                "differs from PID");
-  }
-}
-
-bool HidJoystick::take(std::span<const std::uint8_t> report) noexcept {
-  const auto input = decode_pid_input(layout_, report);
-  if (!input) return false;
-  input_ = *input;
-  return true;
-}
-
-bool HidJoystick::tell(bool heard, std::int64_t now, DeviceState& state) noexcept {
-  if (!heard && heard_ == 0) return false;
-  const std::int64_t since = now - heard_;
-  if (heard) {
-    sequence_ += static_cast<std::uint32_t>(std::clamp(since, millisecond, still_after) / millisecond);
-    heard_ = now;
-    state_ = pid_state(constants_, input_);
-    state_.velocity = velocity_.take(state_.pose.position, now);
-  } else {
-    ++sequence_;
-    if (since > still_after) state_.velocity.setZero();
-  }
-  state = state_;
-  state.sequence = sequence_;
-  return true;
-}
-
-void HidJoystick::encode(const DeviceCommand& command, const DeviceState&, OutputReports& reports) noexcept {
-  const auto forces = effects_.force(pid_force(constants_, command.wrench.force));
-  const std::int64_t now = monotonic_now();
-  for (std::size_t k = 0; k < pid_axes; ++k) {
-    if (same(forces[k], sent_[k].report) && now - sent_[k].time < repeat_after) continue;
-    sent_[k] = {forces[k], now};
-    reports.add(forces[k].span());
-  }
-}
-
-std::vector<OutputReport> HidJoystick::zero() const {
-  std::vector<OutputReport> reports;
-  if (effects_.running()) {
-    for (const PidReport& report : effects_.force({})) {
-      reports.push_back(copy(report));
-    }
-  }
-  PidSequence way_out = effects_;
-  way_out.stop();
-  for (PidRequest request = way_out.next(); request.kind == PidRequest::Kind::output;
-       request = way_out.next()) {
-    reports.push_back(copy(request.report));
-    way_out.done();
-  }
-  return reports;
+std::unique_ptr<HidProtocol> make_hid_joystick(const PidConstants& constants, const DeviceLimits& limits,
+                                               const PidLayout& layout, const std::string& device,
+                                               std::uint32_t last) {
+  return std::make_unique<HidJoystick>(constants, limits, layout, device, last);
 }
 
 }  // namespace palpate

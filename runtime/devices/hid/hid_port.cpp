@@ -68,9 +68,7 @@ void HidPort::open() {
   try {
     protocol->start(*device);
   } catch (const Error&) {
-    for (const OutputReport& report : protocol->zero()) {
-      if (!device->write(report)) break;
-    }
+    for (const OutputReport& report : protocol->zero()) static_cast<void>(device->write(report));
     throw;
   }
   zero_ = protocol->zero();

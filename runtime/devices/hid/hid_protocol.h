@@ -46,7 +46,10 @@ class OutputReports {
 /// thread, `encode` to the writing thread.
 class HidProtocol {
  public:
+  explicit HidProtocol(const DeviceLimits& limits) : limits_(limits) {}
   virtual ~HidProtocol() = default;
+  HidProtocol(const HidProtocol&) = delete;
+  HidProtocol& operator=(const HidProtocol&) = delete;
 
   /// Length of the longest input report of interest, including the id if reports have one [byte].
   [[nodiscard]] virtual std::size_t input_bytes() const noexcept = 0;
@@ -54,8 +57,8 @@ class HidProtocol {
   /// Waiting time for a report [ms].
   [[nodiscard]] virtual int wait() const noexcept { return 10; }
 
-  /// Exchanges the messages needed before reports and forces flow. Throws Error.
-  virtual void start(HidDevice& device) = 0;
+  /// Exchanges the reports that must precede states and forces. Throws Error.
+  virtual void start(HidDevice& /*device*/) {}
 
   /// Decodes and stores an input report; false if it is invalid.
   virtual bool take(std::span<const std::uint8_t> report) noexcept = 0;
@@ -65,13 +68,17 @@ class HidProtocol {
   virtual bool tell(bool heard, std::int64_t now, DeviceState& state) noexcept = 0;
 
   /// Encodes the reports that display `command` with the device at `state`.
-  virtual void encode(const DeviceCommand& command, const DeviceState& state,
-                      OutputReports& reports) noexcept = 0;
+  virtual void encode(const DeviceCommand& /*command*/, const DeviceState& /*state*/,
+                      OutputReports& /*reports*/) noexcept {}
 
   /// Returns the reports after which there is no force, from any state; none for a device without force.
-  [[nodiscard]] virtual std::vector<OutputReport> zero() const = 0;
+  [[nodiscard]] virtual std::vector<OutputReport> zero() const { return {}; }
 
-  [[nodiscard]] virtual DeviceLimits limits() const = 0;
+  /// Limits of the profile, or the device's own where they are smaller, once it was started.
+  [[nodiscard]] const DeviceLimits& limits() const noexcept { return limits_; }
+
+ protected:
+  DeviceLimits limits_;
 };
 
 }  // namespace palpate

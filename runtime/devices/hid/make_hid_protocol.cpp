@@ -1,10 +1,8 @@
 #include "runtime/devices/hid/make_hid_protocol.h"
 
+#include <algorithm>
+
 #include "base/error.h"
-#include "runtime/devices/hid/hid_arm.h"
-#include "runtime/devices/hid/hid_board.h"
-#include "runtime/devices/hid/hid_joystick.h"
-#include "runtime/devices/hid/hid_space_mouse.h"
 
 namespace palpate {
 namespace {
@@ -37,19 +35,18 @@ std::unique_ptr<HidProtocol> make_hid_protocol(const DeviceProfile& profile,
                                                const HidReportDescriptor& descriptor,
                                                const std::string& device, std::uint32_t last) {
   if (std::holds_alternative<BoardConstants>(profile.kind)) {
-    return std::make_unique<HidBoard>(profile.limits, descriptor, device, last);
+    return make_hid_board(profile.limits, descriptor, device, last);
   }
   check_length(descriptor, HidReportType::input, profile.reports.input, "input", device);
   check_length(descriptor, HidReportType::output, profile.reports.output, "output", device);
   check_length(descriptor, HidReportType::feature, profile.reports.feature, "feature", device);
   if (const auto* arm = std::get_if<ArmConstants>(&profile.kind)) {
-    return std::make_unique<HidArm>(*arm, profile.limits, device, last);
+    return make_hid_arm(*arm, profile.limits, device, last);
   }
   if (const auto* joystick = std::get_if<PidConstants>(&profile.kind)) {
-    return std::make_unique<HidJoystick>(*joystick, profile.limits, find_pid_layout(descriptor, device),
-                                         device, last);
+    return make_hid_joystick(*joystick, profile.limits, find_pid_layout(descriptor, device), device, last);
   }
-  return std::make_unique<HidSpaceMouse>(std::get<SpaceMouseConstants>(profile.kind), profile.limits, last);
+  return make_hid_space_mouse(std::get<SpaceMouseConstants>(profile.kind), profile.limits, last);
 }
 
 }  // namespace palpate

@@ -17,4 +17,19 @@ namespace palpate {
                                                              const HidReportDescriptor& descriptor,
                                                              const std::string& device, std::uint32_t last);
 
+// Of one kind each, as above.
+
+[[nodiscard]] std::unique_ptr<HidProtocol> make_hid_arm(const ArmConstants& arm, const DeviceLimits& limits,
+                                                        const std::string& device, std::uint32_t last);
+[[nodiscard]] std::unique_ptr<HidProtocol> make_hid_board(const DeviceLimits& limits,
+                                                          const HidReportDescriptor& descriptor,
+                                                          const std::string& device, std::uint32_t last);
+[[nodiscard]] std::unique_ptr<HidProtocol> make_hid_joystick(const PidConstants& constants,
+                                                             const DeviceLimits& limits,
+                                                             const PidLayout& layout,
+                                                             const std::string& device, std::uint32_t last);
+[[nodiscard]] std::unique_ptr<HidProtocol> make_hid_space_mouse(const SpaceMouseConstants& constants,
+                                                                const DeviceLimits& limits,
+                                                                std::uint32_t last);
+
 }  // namespace palpate

@@ -155,14 +155,10 @@ std::optional<BoardFeature> decode_board_feature(std::span<const std::uint8_t> r
   return feature;
 }
 
-BoardCounts board_counts(const BoardFeature& feature, const Vec3& force) noexcept {
-  const Saturated counts = saturate(force / (1e-6 * feature.force_unit), largest_count);
-  BoardCounts result;
-  result.shown = counts.shown;
-  for (std::size_t k = 0; k < 3; ++k) {
-    result.counts[k] = static_cast<std::int16_t>(std::lround(counts.value[static_cast<Eigen::Index>(k)]));
-  }
-  return result;
+std::array<std::int16_t, 3> board_counts(const BoardFeature& feature, const Vec3& force) noexcept {
+  const Vec3 counts = saturate(force / (1e-6 * feature.force_unit), largest_count);
+  const auto whole = [](double count) { return static_cast<std::int16_t>(std::lround(count)); };
+  return {whole(counts.x()), whole(counts.y()), whole(counts.z())};
 }
 
 }  // namespace palpate

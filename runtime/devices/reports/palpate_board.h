@@ -76,11 +76,8 @@ struct BoardFeature {
 /// Decodes a report. Empty for a wrong id, length or version, and for numbers outside the bounds above.
 [[nodiscard]] std::optional<BoardFeature> decode_board_feature(std::span<const std::uint8_t> report) noexcept;
 
-/// Force in the board's unit, and the fraction of the request that it amounts to.
-struct BoardCounts {
-  std::array<std::int16_t, 3> counts{};
-  double shown = 1.0;  ///< see Saturated
-};
-[[nodiscard]] BoardCounts board_counts(const BoardFeature& feature, const Vec3& force) noexcept;
+/// A force in the board's unit, saturated.
+[[nodiscard]] std::array<std::int16_t, 3> board_counts(const BoardFeature& feature,
+                                                       const Vec3& force) noexcept;
 
 }  // namespace palpate

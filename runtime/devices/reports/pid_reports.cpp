@@ -126,10 +126,10 @@ PidReport encode_operation(const PidLayout& layout, std::uint32_t block, const H
   return report;
 }
 
-PidForce pid_force(const PidConstants& constants, const Vec3& force) noexcept {
-  const Saturated parts =
+std::array<double, pid_axes> pid_force(const PidConstants& constants, const Vec3& force) noexcept {
+  const Vec3 parts =
       saturate({force.x() / constants.full_force[0], force.y() / constants.full_force[1], 0.0}, 1.0);
-  return {{parts.value.x(), parts.value.y()}, parts.shown};
+  return {parts.x(), parts.y()};
 }
 
 }  // namespace palpate

@@ -71,12 +71,8 @@ struct PidBlockLoad {
 [[nodiscard]] PidReport encode_operation(const PidLayout& layout, std::uint32_t block,
                                          const HidOption& option) noexcept;
 
-/// Fractions of the largest magnitudes in x and y, and the fraction of the force [N] that they display. z is
-/// not displayed.
-struct PidForce {
-  std::array<double, pid_axes> parts{};
-  double shown = 1.0;  ///< see Saturated; for the components in the plane
-};
-[[nodiscard]] PidForce pid_force(const PidConstants& constants, const Vec3& force) noexcept;
+/// A force [N] as parts of the largest magnitudes, along x and y, saturated. z is not shown.
+[[nodiscard]] std::array<double, pid_axes> pid_force(const PidConstants& constants,
+                                                     const Vec3& force) noexcept;
 
 }  // namespace palpate

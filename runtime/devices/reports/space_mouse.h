@@ -18,7 +18,7 @@ namespace palpate {
 struct SpaceMouseReport {
   std::optional<std::array<std::int16_t, 3>>
       translation{};                                      ///< right, to the user, down [counts, 350 is full]
-  std::optional<std::array<std::int16_t, 3>> rotation{};  ///< about those axes [counts]
+  std::optional<std::array<std::int16_t, 3>> rotation{};  ///< about the same axes [counts]
   std::optional<std::uint32_t> buttons{};                 ///< bit k: button k is down
 };
 

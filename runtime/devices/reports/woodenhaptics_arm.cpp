@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "runtime/safety/saturation.h"
+
 namespace palpate {
 namespace {
 
@@ -84,7 +86,7 @@ std::optional<Vec3> inverse_arm(const ArmConstants& arm, const Vec3& position) n
   return Vec3(std::atan2(p.y(), p.x()), B, C);
 }
 
-Saturated motor_currents(const ArmConstants& arm, const Vec3& angles, const Vec3& force) noexcept {
+Vec3 motor_currents(const ArmConstants& arm, const Vec3& angles, const Vec3& force) noexcept {
   const Vec3 joint_torques = arm_jacobian(arm, angles).transpose() * force;
   const Vec3 motor_torques = joint_torques.cwiseProduct(transmission(arm));
   return saturate(motor_torques.cwiseQuotient(arm.torque_constants), arm.max_current);

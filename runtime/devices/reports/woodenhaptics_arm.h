@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "meshes/mesh.h"
-#include "runtime/safety/saturation.h"
 
 namespace palpate {
 
@@ -57,7 +56,6 @@ struct ArmConstants {
 
 /// Returns the motor currents a, b, c [A] that display `force` [N] on the hand: joint torques J^T F through
 /// the capstans. All are scaled together if one would exceed `max_current`.
-[[nodiscard]] Saturated motor_currents(const ArmConstants& arm, const Vec3& angles,
-                                       const Vec3& force) noexcept;
+[[nodiscard]] Vec3 motor_currents(const ArmConstants& arm, const Vec3& angles, const Vec3& force) noexcept;
 
 }  // namespace palpate

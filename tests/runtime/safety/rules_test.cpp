@@ -90,13 +90,6 @@ TEST(StiffnessLimit, LeavesWhatIsSoft) {
   EXPECT_EQ(limited_stiffness(Mat3::Constant(1e200), 1000.0), Mat3::Zero());
 }
 
-TEST(StiffnessLimit, CouplingInSeriesWithTheBodyIsTheLimit) {
-  const double coupling = coupling_stiffness(1000.0, 3000.0);
-  EXPECT_NEAR(1.0 / (1.0 / coupling + 1.0 / 3000.0), 1000.0, 1e-9);
-  EXPECT_EQ(coupling_stiffness(1000.0, 900.0), inf);
-  EXPECT_EQ(coupling_stiffness(1000.0, inf), 1000.0);
-}
-
 TEST(EngageGate, OpensWhenForceIsSmallForAWhileOutsideTheBody) {
   EngageGate gate(0.1, 9.5 * ms);
   for (int k = 0; k < 100; ++k) EXPECT_FALSE(gate.pass(0.2, false, ms));

@@ -180,35 +180,6 @@ TEST(Workspace, LocalModelIsTheSameFieldOnBothSides) {
             1e-12 * expected.norm());
 }
 
-/// What the body's side does at its limits is what the device has as its own.
-TEST(Workspace, LimitsMeet) {
-  Random random(8);
-  const WorkspaceOptions options = random.workspace();
-  const Workspace workspace(options);
-  const DeviceLimits device = {.max_force = 5.0,
-                               .max_torque = 0.2,
-                               .max_stiffness = 1000.0,
-                               .max_damping = 8.0,
-                               .workspace_radius = 0.1};
-  const DeviceLimits limits = workspace.in_body(device);
-  DeviceCommand body;
-  body.wrench.force = limits.max_force * random.vector().normalized();
-  body.wrench.torque = limits.max_torque * random.vector().normalized();
-  body.local.stiffness = limits.max_stiffness * Mat3::Identity();
-  const DeviceCommand felt = workspace.in_device(body);
-  EXPECT_NEAR(felt.wrench.force.norm(), device.max_force, 1e-12 * 5.0);
-  EXPECT_NEAR(felt.wrench.torque.norm(), device.max_torque, 1e-12);
-  EXPECT_TRUE(felt.local.stiffness.isApprox(device.max_stiffness * Mat3::Identity(), 1e-12));
-  // A damper of the body's limit, f = -B v: felt with the device's.
-  DeviceState hand;
-  hand.velocity = random.vector();
-  body.wrench.force = -limits.max_damping * workspace.in_body(hand).velocity;
-  EXPECT_TRUE(workspace.in_device(body).wrench.force.isApprox(-device.max_damping * hand.velocity, 1e-12));
-  const Vec3 rim = options.device_origin + device.workspace_radius * random.vector().normalized();
-  EXPECT_NEAR((workspace.position_in_body(rim) - options.body_origin).norm(), limits.workspace_radius, 1e-12);
-  EXPECT_EQ(workspace.in_body(DeviceLimits{}).max_force, std::numeric_limits<double>::infinity());
-}
-
 TEST(Workspace, RefusesWhatIsNoMap) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double scale : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()}) {

@@ -19,36 +19,75 @@ PageWord parsed(const std::string& text) {
   std::string problem;
   const std::optional<PageWord> word = parse_page_word(text, problem);
   EXPECT_TRUE(word) << problem;
-  return word.value_or(StepWord{});
+  return word.value_or(PageWord{});
+}
+
+/// Notes what it was asked last.
+struct NotingRun : ViewedRun {
+  std::string asked;
+  PointerPose wanted;
+  SettingsChange settings;
+
+  void point(const PointerPose& pose) override {
+    asked = "point";
+    wanted = pose;
+  }
+  void pause(bool paused) override { asked = paused ? "pause" : "go on"; }
+  void step_once() override { asked = "step"; }
+  void reset() override { asked = "reset"; }
+  void acknowledge() override { asked = "acknowledge"; }
+  void change(const SettingsChange& changed) override {
+    asked = "change";
+    settings = changed;
+  }
+  void record(bool on) override { asked = on ? "record" : "end"; }
+  void seek(std::int64_t frame) override { asked = "seek " + std::to_string(frame); }
+};
+
+NotingRun asked(const std::string& text) {
+  NotingRun run;
+  const PageWord word = parsed(text);
+  if (word.ask) word.ask(run);
+  return run;
 }
 
 TEST(PageWord, ThoseOfTheProtocolAreUnderstood) {
-  const auto point = std::get<PointWord>(parsed(
-      R"({"type":"point","position":[1,-2.5,3e-3],"orientation":[0.6,0,0,0.8],"grab":true,"lifted":false})"));
+  const NotingRun point = asked(
+      R"({"type":"point","position":[1,-2.5,3e-3],"orientation":[0.6,0,0,0.8],"grab":true,"lifted":false})");
+  EXPECT_EQ(point.asked, "point");
   EXPECT_EQ(point.wanted.pose.position, Vec3(1, -2.5, 0.003));
   EXPECT_NEAR(point.wanted.pose.orientation.x(), 0.6, 1e-15);
   EXPECT_NEAR(point.wanted.pose.orientation.w(), 0.8, 1e-15);
   EXPECT_TRUE(point.wanted.pose.grab);
   EXPECT_FALSE(point.wanted.lifted);
-  EXPECT_TRUE(std::get<PauseWord>(parsed(R"({"type":"pause","paused":true})")).paused);
-  EXPECT_TRUE(std::holds_alternative<StepWord>(parsed(R"({"type":"step"})")));
-  EXPECT_TRUE(std::holds_alternative<ResetWord>(parsed(R"({"type":"reset"})")));
-  EXPECT_TRUE(std::holds_alternative<AcknowledgeWord>(parsed(R"({"type":"acknowledge"})")));
-  const auto change =
-      std::get<ChangeWord>(parsed(R"({"type":"change","settings":{"tool":"sphere:0.005","overlay":null}})"));
+  EXPECT_EQ(asked(R"({"type":"pause","paused":true})").asked, "pause");
+  EXPECT_EQ(asked(R"({"type":"pause","paused":false})").asked, "go on");
+  EXPECT_EQ(asked(R"({"type":"step"})").asked, "step");
+  EXPECT_EQ(asked(R"({"type":"reset"})").asked, "reset");
+  EXPECT_EQ(asked(R"({"type":"acknowledge"})").asked, "acknowledge");
+  const NotingRun change = asked(R"({"type":"change","settings":{"tool":"sphere:0.005","overlay":null}})");
+  EXPECT_EQ(change.asked, "change");
   EXPECT_EQ(change.settings, (SettingsChange{{"tool", "sphere:0.005"}, {"overlay", std::nullopt}}));
-  EXPECT_FALSE(std::get<RecordWord>(parsed(R"({"type":"record","on":false})")).on);
-  EXPECT_TRUE(std::get<ControlWord>(parsed(R"({"type":"control","take":true})")).take);
-  EXPECT_EQ(std::get<SeekWord>(parsed(R"({"type":"seek","frame":123})")).frame, 123);
-  EXPECT_STREQ(name_of(parsed(R"({"type":"seek","frame":0})")), "seek");
-  EXPECT_STREQ(name_of(parsed(R"({"type":"follow"})")), "follow");
-  EXPECT_STREQ(name_of(parsed(R"({"type":"control","take":true})")), "control");
+  EXPECT_EQ(asked(R"({"type":"record","on":false})").asked, "end");
+  EXPECT_EQ(asked(R"({"type":"record","on":true})").asked, "record");
+  EXPECT_EQ(asked(R"({"type":"seek","frame":123})").asked, "seek 123");
+  EXPECT_EQ(parsed(R"({"type":"seek","frame":123})").frame, 123);
+  EXPECT_EQ(parsed(R"({"type":"seek","frame":0})").type, "seek");
+  for (const char* const take : {"true", "false"}) {
+    const PageWord control = parsed(std::string(R"({"type":"control","take":)") + take + "}");
+    EXPECT_EQ(control.type, "control");
+    EXPECT_EQ(control.take, take == std::string("true"));
+    EXPECT_FALSE(control.ask) << "it is between pages";
+  }
+  EXPECT_EQ(parsed(R"({"type":"follow"})").type, "follow");
+  EXPECT_FALSE(parsed(R"({"type":"follow"})").ask);
 }
 
 TEST(PageWord, OrientationIsMadeAUnitQuaternion) {
-  const auto point = std::get<PointWord>(parsed(
-      R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,1.005],"grab":false,"lifted":true})"));
+  const NotingRun point =
+      asked(R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,1.005],"grab":false,"lifted":true})");
   EXPECT_EQ(point.wanted.pose.orientation.w(), 1.0);
+  EXPECT_TRUE(point.wanted.lifted);
 }
 
 TEST(PageWord, NothingElseIs) {
@@ -116,7 +155,9 @@ RC_GTEST_PROP(PageWord, BrokenWordsNeitherCrashNorAreObeyed, ()) {
   text[cut] = *rc::gen::arbitrary<char>();
   const std::optional<PageWord> word = parse_page_word(text, problem);  // may still be one
   if (word) {
-    const PointerPose& wanted = std::get<PointWord>(*word).wanted;
+    NotingRun run;
+    word->ask(run);
+    const PointerPose& wanted = run.wanted;
     RC_ASSERT(wanted.pose.position.allFinite() && wanted.pose.position.cwiseAbs().maxCoeff() <= 1e6);
     RC_ASSERT(std::abs(wanted.pose.orientation.norm() - 1.0) < 1e-12);
   }

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "base/error.h"
-#include "runtime/devices/hid/hid_joystick.h"
 #include "runtime/devices/hid/hid_port.h"
+#include "runtime/devices/hid/make_hid_protocol.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/safety/silence_watch.h"
@@ -484,10 +484,10 @@ TEST(HidJoystick, OneThatReportsChangesAndRestsIsToldOn) {
 /// A stick that reports each 10 ms: between, its place is told again; its speed is from report to report.
 TEST(HidJoystick, RepetitionsMakeNoSpeed) {
   const PidConstants constants = joystick();
-  HidJoystick stick(constants, {},
-                    find_pid_layout(parse_report_descriptor(bytes(side_winder_descriptor), ""), ""), "", 7);
+  const auto stick = make_hid_joystick(
+      constants, {}, find_pid_layout(parse_report_descriptor(bytes(side_winder_descriptor), ""), ""), "", 7);
   DeviceState state;
-  EXPECT_FALSE(stick.tell(false, 1, state));
+  EXPECT_FALSE(stick->tell(false, 1, state));
   SpeedLimit limit(1.0, 1e-3);
   double fastest = 0.0;
   for (int ms = 0; ms < 200; ++ms) {
@@ -496,9 +496,9 @@ TEST(HidJoystick, RepetitionsMakeNoSpeed) {
     if (reports) {
       // 0.4 m/s from the left stop, in counts of the descriptor.
       JoystickFirmware firmware(constants, [&](double) { return Vec3(-0.05 + 4e-4 * ms, 0.0, 0.0); });
-      ASSERT_TRUE(stick.take(*firmware.input()));
+      ASSERT_TRUE(stick->take(*firmware.input()));
     }
-    ASSERT_TRUE(stick.tell(reports, 1'000'000'000 + 1'000'000LL * ms, state));
+    ASSERT_TRUE(stick->tell(reports, 1'000'000'000 + 1'000'000LL * ms, state));
     state.arrived = 1'000'000'000 + 1'000'000LL * ms;
     limit.see(state);
     if (ms >= 10) fastest = std::max(fastest, limit.speed());

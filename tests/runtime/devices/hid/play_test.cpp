@@ -284,7 +284,7 @@ TEST_F(PlayedDevice, ABoardIsFeltAsTheSessionSays) {
     heard.insert(tick.sequence);
     // Each is the place that belongs to its number: none is torn, none was miscounted.
     ASSERT_LT((vector(tick.handle_position) - pressing(1e-3 * (tick.sequence - 1))).norm(), 1e-6);
-    const auto counts = board_counts(board_feature, vector(tick.shown_force)).counts;
+    const auto counts = board_counts(board_feature, vector(tick.shown_force));
     const auto report = encode_board_force({tick.sequence - 1, counts});
     computed.insert(characters(report));
     largest = std::max(largest, vector(tick.shown_force).norm());
@@ -328,7 +328,7 @@ TEST_F(PlayedDevice, WoodenHapticsIsFeltAsTheSessionSays) {
     heard.insert(tick.sequence);
     const Vec3 place = vector(tick.handle_position);
     const Vec3 force = vector(tick.shown_force);
-    const auto report = encode_currents(motor_currents(arm, inverse_arm(arm, place).value(), force).value);
+    const auto report = encode_currents(motor_currents(arm, inverse_arm(arm, place).value(), force));
     computed.insert(characters(report));
     largest = std::max(largest, force.norm());
     ASSERT_LT(place.head<2>().norm(), 3e-4);

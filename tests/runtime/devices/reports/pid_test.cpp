@@ -2,15 +2,16 @@
 // joystick.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include "base/error.h"
 #include "runtime/devices/reports/hid_report_descriptor.h"
+#include "runtime/devices/reports/pid_effects.h"
 #include "runtime/devices/reports/pid_layout.h"
 #include "runtime/devices/reports/pid_reports.h"
-#include "runtime/devices/reports/pid_sequence.h"
 #include "tests/support/devices/bytes.h"
 
 namespace palpate::pid_test {
@@ -262,12 +263,8 @@ TEST(PidReports, BlockLoad) {
 }
 
 TEST(PidReports, ForceInParts) {
-  const PidForce small = pid_force(constants, Vec3(5, -2.5, 100));
-  EXPECT_EQ(small.parts, (std::array<double, 2>{0.5, -0.25}));
-  EXPECT_EQ(small.shown, 1.0);
-  const PidForce large = pid_force(constants, Vec3(20, 10, 0));
-  EXPECT_EQ(large.parts, (std::array<double, 2>{1.0, 0.5}));
-  EXPECT_EQ(large.shown, 0.5);
+  EXPECT_EQ(pid_force(constants, Vec3(5, -2.5, 100)), (std::array<double, 2>{0.5, -0.25}));
+  EXPECT_EQ(pid_force(constants, Vec3(20, 10, 0)), (std::array<double, 2>{1.0, 0.5}));
 }
 
 /// The same device with other report ids.
@@ -337,36 +334,36 @@ struct SimulatedJoystick {
   }
 };
 
-void talk(PidSequence& sequence, SimulatedJoystick& joystick) {
-  for (int i = 0; i < 1000; ++i) {
-    const PidRequest request = sequence.next();
-    const Bytes report = as_bytes(request.report.span());
-    switch (request.kind) {
-      case PidRequest::Kind::none:
-        return;
-      case PidRequest::Kind::output:
-        joystick.output(report);
-        sequence.done();
-        break;
-      case PidRequest::Kind::set_feature:
-        joystick.set_feature(report);
-        sequence.done();
-        break;
-      case PidRequest::Kind::get_feature:
-        sequence.received(joystick.get_feature(report));
-        break;
-    }
-  }
-  FAIL() << "it never ends";
+/// The wire to a joystick that takes all reports.
+PidWire wire_to(SimulatedJoystick& joystick) {
+  return {.output =
+              [&](const PidReport& report) {
+                joystick.output(as_bytes(report.span()));
+                return true;
+              },
+          .set_feature =
+              [&](const PidReport& report) {
+                joystick.set_feature(as_bytes(report.span()));
+                return true;
+              },
+          .get_feature =
+              [&](PidReport& report) {
+                const Bytes answer = joystick.get_feature(as_bytes(report.span()));
+                std::copy(answer.begin(), answer.end(), report.bytes.begin());
+                report.size = answer.size();
+                return true;
+              }};
 }
 
-TEST(PidSequence, MakesAJoystickShowForces) {
+void stop(const PidEffects& effects, SimulatedJoystick& joystick) {
+  for (const PidReport& report : effects.stop()) joystick.output(as_bytes(report.span()));
+}
+
+TEST(PidEffects, MakeAJoystickShowForces) {
   const PidLayout layout = side_winder();
-  PidSequence sequence(layout, constants);
+  PidEffects effects(layout, constants);
   SimulatedJoystick joystick;
-  talk(sequence, joystick);
-  ASSERT_TRUE(sequence.running());
-  EXPECT_EQ(sequence.failure(), nullptr);
+  ASSERT_EQ(effects.start(wire_to(joystick)), nullptr);
   EXPECT_EQ(joystick.resets, 1);
   EXPECT_TRUE(joystick.actuators);
   EXPECT_TRUE(joystick.effects[1].plays);
@@ -374,72 +371,81 @@ TEST(PidSequence, MakesAJoystickShowForces) {
   EXPECT_EQ(joystick.effects[1].direction, 191);
   EXPECT_EQ(joystick.effects[2].direction, 128);
   EXPECT_EQ(joystick.effects[1].magnitude, 0);
-  for (const PidReport& report : sequence.force(pid_force(constants, Vec3(10, -5, 0)))) {
+  for (const PidReport& report : effects.force(pid_force(constants, Vec3(10, -5, 0)))) {
     joystick.output(as_bytes(report.span()));
   }
   EXPECT_EQ(joystick.effects[1].magnitude, 255);
   EXPECT_EQ(joystick.effects[2].magnitude, -128);
 
-  sequence.stop();
-  EXPECT_FALSE(sequence.running());
-  const PidRequest first = sequence.next();
-  EXPECT_EQ(as_bytes(first.report.span()), bytes("0a 01 03 ff"));
-  talk(sequence, joystick);
+  std::vector<Bytes> way_out;
+  for (const PidReport& report : effects.stop()) way_out.push_back(as_bytes(report.span()));
+  EXPECT_EQ(way_out, (std::vector{bytes("05 01 00 00"), bytes("05 02 00 00"), bytes("0a 01 03 ff"),
+                                  bytes("0a 02 03 ff"), bytes("0c 04")}));
+  stop(effects, joystick);
   EXPECT_EQ(joystick.resets, 2);
   EXPECT_FALSE(joystick.actuators);
-  EXPECT_EQ(sequence.failure(), nullptr);
 }
 
-TEST(PidSequence, SaysWhenTheDeviceIsFull) {
+TEST(PidEffects, SayWhenTheDeviceIsFull) {
   const PidLayout layout = side_winder();
-  PidSequence sequence(layout, constants);
+  PidEffects effects(layout, constants);
   SimulatedJoystick joystick;
   joystick.room = 1;
-  talk(sequence, joystick);
-  EXPECT_FALSE(sequence.running());
-  ASSERT_NE(sequence.failure(), nullptr);
-  EXPECT_NE(std::string(sequence.failure()).find("no room"), std::string::npos);
+  const char* const failure = effects.start(wire_to(joystick));
+  ASSERT_NE(failure, nullptr);
+  EXPECT_NE(std::string(failure).find("no room"), std::string::npos);
+  stop(effects, joystick);
   EXPECT_EQ(joystick.resets, 2);  // the first axis's effect does not play on
 }
 
-TEST(PidSequence, SaysWhenTheDeviceNeverLoads) {
+TEST(PidEffects, SayWhenTheDeviceNeverLoads) {
   const PidLayout layout = side_winder();
-  PidSequence sequence(layout, constants);
+  PidEffects effects(layout, constants);
   SimulatedJoystick joystick;
   joystick.busy = 60;
-  talk(sequence, joystick);
-  ASSERT_NE(sequence.failure(), nullptr);
-  EXPECT_NE(std::string(sequence.failure()).find("does not say that it loaded"), std::string::npos);
-  PidSequence patient(layout, constants);
+  const char* const failure = effects.start(wire_to(joystick));
+  ASSERT_NE(failure, nullptr);
+  EXPECT_NE(std::string(failure).find("does not say that it loaded"), std::string::npos);
+  PidEffects patient(layout, constants);
   SimulatedJoystick slow;
   slow.busy = 59;
-  talk(patient, slow);
-  EXPECT_TRUE(patient.running());
+  EXPECT_EQ(patient.start(wire_to(slow)), nullptr);
 }
 
-TEST(PidSequence, SaysWhenTheDeviceRefuses) {
+/// Each report that the device takes in turn is the first that it refuses.
+TEST(PidEffects, SayWhenTheDeviceRefuses) {
   const PidLayout layout = side_winder();
-  PidSequence sequence(layout, constants);
-  sequence.refused();
-  EXPECT_NE(std::string(sequence.failure()).find("refuses a report"), std::string::npos);
-  sequence.refused();  // the reset on the way out too
-  EXPECT_EQ(sequence.next().kind, PidRequest::Kind::none);
-  EXPECT_FALSE(sequence.running());
+  for (int taken = 0; taken < 10; ++taken) {
+    PidEffects effects(layout, constants);
+    SimulatedJoystick joystick;
+    PidWire wire = wire_to(joystick);
+    int left = taken;
+    const auto until_refused = [&left](const auto& send) {
+      return [&left, send](const PidReport& report) { return left-- > 0 && send(report); };
+    };
+    wire.output = until_refused(wire.output);
+    wire.set_feature = until_refused(wire.set_feature);
+    const char* const failure = effects.start(wire);
+    ASSERT_NE(failure, nullptr) << taken;
+    EXPECT_NE(std::string(failure).find("refuses a report"), std::string::npos) << taken;
+    EXPECT_EQ(as_bytes(effects.stop().back().span()), bytes("0c 04")) << taken;
+    EXPECT_EQ(effects.stop().size(), taken < 3 ? 1U : taken < 7 ? 3U : 5U) << taken;
+  }
 }
 
-TEST(PidSequence, GarbageForAnAnswerIsNoAnswer) {
+TEST(PidEffects, GarbageForAnAnswerIsNoAnswer) {
   const PidLayout layout = side_winder();
-  PidSequence sequence(layout, constants);
-  for (int i = 0; i < 3; ++i) {
-    sequence.done();  // reset, enable, create
-  }
-  ASSERT_EQ(sequence.next().kind, PidRequest::Kind::get_feature);
-  for (int i = 0; i < 59; ++i) {
-    sequence.received(bytes("ff ff ff"));
-    ASSERT_EQ(sequence.failure(), nullptr);
-  }
-  sequence.received({});
-  EXPECT_NE(sequence.failure(), nullptr);
+  PidEffects effects(layout, constants);
+  SimulatedJoystick joystick;
+  PidWire wire = wire_to(joystick);
+  int asked = 0;
+  wire.get_feature = [&](PidReport& report) {
+    report.bytes.fill(0xFF);
+    report.size = ++asked == 60 ? 0 : 3;
+    return true;
+  };
+  EXPECT_NE(effects.start(wire), nullptr);
+  EXPECT_EQ(asked, 60);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "runtime/devices/reports/palpate_board.h"
-#include "runtime/devices/reports/pid_sequence.h"
+#include "runtime/devices/reports/pid_effects.h"
 #include "runtime/devices/reports/space_mouse.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
 #include "tests/support/devices/board_codec.h"
@@ -39,7 +39,6 @@ TEST(DeviceHeap, TicksTakeNothing) {
   const Bytes encoders(woodenhaptics_report_bytes, 0);
   const Bytes cap = bytes("01 5e 01 a2 fe 03 00 04 00 05 00 fa ff");
   const Bytes stick = bytes("01 ff 01 00 02 00 00 00 05 00 00 00 00");
-  const Bytes loaded = bytes("02 03 01 ff 00");
   const auto board_report = encode_board_input({1, 6, {1, 2, 3, 4, 5, 6}, 1});
   const ArmConstants arm{.lengths = Vec3::Ones(),
                          .capstan_diameters = Vec3::Ones(),
@@ -51,7 +50,7 @@ TEST(DeviceHeap, TicksTakeNothing) {
   const PidLayout layout =
       find_pid_layout(parse_report_descriptor(bytes(side_winder_descriptor), "it"), "it");
   const PidConstants constants{{1, 1}, {1, 1}};
-  PidSequence sequence(layout, constants);
+  PidEffects effects(layout, constants);
   const BoardFeature feature{.force_unit = 250};
 
   EXPECT_EQ(allocations > 0, PALPATE_OWN_MALLOC == 1);
@@ -60,17 +59,14 @@ TEST(DeviceHeap, TicksTakeNothing) {
   for (int tick = 0; tick < 10; ++tick) {
     const auto report = decode_encoders(encoders);
     sum += arm_state(arm, *report).pose.position.x();
-    const Saturated currents = motor_currents(arm, joint_angles(arm, report->counters), Vec3(1, 2, 3));
-    sum += encode_currents(currents.value)[1];
+    const Vec3 currents = motor_currents(arm, joint_angles(arm, report->counters), Vec3(1, 2, 3));
+    sum += encode_currents(currents)[1];
     mouse.take(*decode_space_mouse(cap));
     sum += mouse.advance(1e-3).pose.position.x();
     sum += pid_state(constants, *decode_pid_input(layout, stick)).pose.position.x();
-    sum += sequence.force(pid_force(constants, Vec3(1, 2, 3)))[0].bytes[0];
-    sum += sequence.next().report.bytes[0];
-    sequence.done();
-    sequence.received(loaded);
+    sum += effects.force(pid_force(constants, Vec3(1, 2, 3)))[0].bytes[0];
     sum += board_state(*decode_board_input(board_report)).pose.position.x();
-    sum += encode_board_force({1, board_counts(feature, Vec3(1, 2, 3)).counts})[5];
+    sum += encode_board_force({1, board_counts(feature, Vec3(1, 2, 3))})[5];
   }
   EXPECT_EQ(allocations, before);
   EXPECT_GT(sum, 0.0);
