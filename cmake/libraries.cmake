@@ -35,6 +35,28 @@ if(PALPATE_SANITIZE)
   target_link_options(palpate_options INTERFACE -fsanitize=${PALPATE_SANITIZE})
 endif()
 
+# palpate_shared_headers(NAME [LIBS lib ...] [HEADERS <x.h> ...]): headers of others that most sources include, compiled once for all libraries with the flags of LIBS.
+function(palpate_shared_headers name)
+  cmake_parse_arguments(ARG "" "" "LIBS;HEADERS" ${ARGN})
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp CONTENT "")
+  add_library(${name} STATIC ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  target_link_libraries(${name} PUBLIC palpate_options Eigen3::Eigen ${ARG_LIBS})
+  target_precompile_headers(${name} PRIVATE <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <atomic> <chrono> <filesystem>
+    <functional> <map> <memory> <mutex> <optional> <span> <string> <thread> <vector> ${ARG_HEADERS})
+endfunction()
+
+# Those that runtime/core and what it stands on include: of the standard library and Eigen alone.
+macro(palpate_core_headers)
+  palpate_shared_headers(palpate_core_headers)
+  palpate_shared_headers(palpate_core_kernel_headers LIBS palpate_kernel_options)
+endmacro()
+
+# Libraries of the folder that calls it, and below, take these.
+macro(palpate_use_core_headers)
+  set(PALPATE_HEADERS palpate_core_headers)
+  set(PALPATE_KERNEL_HEADERS palpate_core_kernel_headers)
+endmacro()
+
 # palpate_library(NAME SOURCES a.cpp ... [KERNELS k.cpp ...] [LIBS lib ...] [PRIVATE lib ...]): the library of the folder that calls it. Who links it
 # can include the folder's headers, as "FOLDER/x.h", and those of LIBS; the headers of no other folder can be found at all.
 function(palpate_library name)
@@ -42,9 +64,7 @@ function(palpate_library name)
   if(ARG_SOURCES OR ARG_KERNELS)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC palpate_options ${ARG_LIBS} PRIVATE ${ARG_PRIVATE})
-    if(PALPATE_HEADERS)
-      target_precompile_headers(${name} REUSE_FROM ${PALPATE_HEADERS})
-    endif()
+    target_precompile_headers(${name} REUSE_FROM ${PALPATE_HEADERS})
     palpate_show_headers(${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
   else()
     add_library(${name} INTERFACE)
@@ -54,9 +74,7 @@ function(palpate_library name)
   if(ARG_KERNELS)
     add_library(${name}_kernels OBJECT ${ARG_KERNELS})
     target_link_libraries(${name}_kernels PRIVATE palpate_options ${ARG_LIBS} palpate_kernel_options)
-    if(PALPATE_HEADERS)
-      target_precompile_headers(${name}_kernels REUSE_FROM palpate_kernel_headers)
-    endif()
+    target_precompile_headers(${name}_kernels REUSE_FROM ${PALPATE_KERNEL_HEADERS})
     target_include_directories(${name}_kernels PRIVATE ${PALPATE_BUILD}/include/${name})
     set_target_properties(${name}_kernels PROPERTIES UNITY_BUILD OFF)  # what the compiler inlines into a tick hangs on nothing beside it
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${name}_kernels>)

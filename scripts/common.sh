@@ -81,6 +81,7 @@ empty_debian() {
   command -v debootstrap >/dev/null || fail "debootstrap is missing" "apt-get install debootstrap"
   mirror=$(sed -n 's/^deb \(\[[^]]*\] \)\?\(http[^ ]*\) .*/\2/p;s/^URIs: //p' /etc/apt/sources.list /etc/apt/sources.list.d/* 2>/dev/null | grep -m 1 '/debian/*$' || true)
   say "an empty Debian ($suite)"
+  chmod 755 "$system"  # its root, which users other than root have to see through
   debootstrap --variant=minbase "$suite" "$system" ${mirror:+"$mirror"} >/dev/null
   echo force-unsafe-io >"$system/etc/dpkg/dpkg.cfg.d/quick"  # it is thrown away
   # As this machine reaches its registries.

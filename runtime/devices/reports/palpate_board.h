@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 #include "runtime/devices/reports/hid_report_descriptor.h"
 #include "runtime/safety/device.h"
 

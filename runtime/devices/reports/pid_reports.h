@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 #include "runtime/devices/reports/pid_layout.h"
 #include "runtime/safety/device.h"
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <span>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 #include "runtime/safety/device.h"
 
 namespace palpate {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate {
 

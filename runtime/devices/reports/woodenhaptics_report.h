@@ -10,7 +10,7 @@
 #include <optional>
 #include <span>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 #include "runtime/devices/reports/woodenhaptics_arm.h"
 #include "runtime/safety/device.h"
 
