@@ -6,8 +6,9 @@
 #include <numeric>
 
 #include "base/error.h"
-#include "precompute/compression/certificate.h"
 #include "precompute/compression/out_of_reach.h"
+#include "precompute/progress.h"
+#include "precompute/spread_plan.h"
 
 namespace palpate {
 namespace {
@@ -77,6 +78,104 @@ double worst_of(const std::vector<TouchErrors>& errors) {
   return worst;
 }
 
+/// Compression of the Green's functions of a plan.
+class GreensCompressor {
+ public:
+  GreensCompressor(const BakeRun& run, const CompressionPlan& plan, const Factor& factor, ModelWriter& writer)
+      : run_(run),
+        plan_(plan),
+        factor_(factor),
+        writer_(writer),
+        sharing_(run.team, run.jobs, run.interrupted),
+        compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, sharing_,
+                     [this](CompressionStage stage, double share) { return reach(name_of(stage), share); }) {}
+
+  /// Solves for the near pairs of the leaves of `part` that the file does not have. False when interrupted.
+  bool solve_near(const PieceRange& part) {
+    std::vector<std::vector<float>> scratch(static_cast<std::size_t>(run_.jobs));
+    stage_ = near_stage;
+    return solve_pieces(run_, near_tiles(plan_.frame), part,
+                        {near_stage, "those of ", "leaves", plan_.near_seconds,
+                         [&](const Tile& tile) { return writer_.has_near(static_cast<Index>(tile.first)); },
+                         [&](const Tile& tile, int worker) {
+                           std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
+                           compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
+                           writer_.write_near(static_cast<Index>(tile.first), entries);
+                         }});
+  }
+
+  /// The matrix, with the near pairs of the file, which has all. Null when interrupted.
+  std::shared_ptr<const HierarchicalMatrix> compress();
+
+ private:
+  bool reach(const char* stage, double share) {
+    if (stage != stage_) run_.progress.begin(stage_ = stage);
+    run_.progress.reach(share);
+    return !run_.interrupted();
+  }
+
+  const BakeRun& run_;
+  const CompressionPlan& plan_;
+  const Factor& factor_;
+  ModelWriter& writer_;
+  TeamSharing sharing_;
+  const char* stage_ = nullptr;  // current stage
+  Compression compression_;
+};
+
+std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress() {
+  if (!compression_.prepare([&](Index leaf, std::span<float> entries) { writer_.read_near(leaf, entries); }))
+    return nullptr;
+  double cut = cut_of_tolerance * plan_.frame.tolerance;
+  for (int attempt = 1;; ++attempt, cut *= finer) {
+    const std::shared_ptr<HierarchicalMatrix> matrix = compression_.compress(cut);
+    if (matrix == nullptr) return nullptr;
+    std::vector<TouchErrors> errors =
+        certify(*matrix, factor_, plan_.stored.dofs, plan_.places.points, plan_.places.touchable, touches,
+                certificate_seed, sharing_, [&](double share) { return reach(touch_stage, share); });
+    if (run_.team.any(run_.interrupted())) return nullptr;
+    const double worst = worst_of(errors);
+    if (worst <= accepted * plan_.frame.tolerance) {
+      loosen_bound(*matrix, errors);
+      matrix->tolerance = plan_.frame.tolerance;
+      matrix->certificate = table_of(errors);
+      run_.progress.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",
+                                     1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
+      return matrix;
+    }
+    if (attempt == most_cuts) {
+      throw OutOfReach(fmt::format("compressed, forces of random touches are off by up to {:.2g} of the "
+                                   "largest, the tolerance is {:.2g}",
+                                   worst, plan_.frame.tolerance),
+                       "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+    }
+    run_.progress.line(
+        fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));
+  }
+}
+
+/// In the leader, which the others help to solve.
+std::optional<Solved> solve_compressed_alone(const BakeRun& run, const CompressionPlan& plan,
+                                             const Factor& factor, SpreadNumbers& spread,
+                                             ModelWriter& writer) {
+  Solved solved;
+  std::string refused;  // reason if it is out of reach
+  const bool whole = work_while_others_serve(spread, run, [&](const BakeRun& leader) {
+    try {
+      GreensCompressor compressor(leader, plan, factor, writer);
+      if (compressor.solve_near({0, plan.frame.tree.leaves()})) solved.compressed = compressor.compress();
+      if (solved.compressed == nullptr) return false;
+      solved.probes = make_probes(factor, plan.stored.dofs);
+    } catch (const OutOfReach& error) {
+      refused = to_text(error);
+    }
+    return true;
+  });
+  refused = run.team.share(refused);
+  if (!refused.empty()) throw OutOfReach(refused, "", "");
+  return whole ? std::optional(std::move(solved)) : std::nullopt;
+}
+
 }  // namespace
 
 bool wants_compression(const Description& description, std::int64_t stored_nodes) {
@@ -138,88 +237,27 @@ std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {
   return tiles;
 }
 
-GreensCompressor::GreensCompressor(const CompressionPlan& plan, const Factor& factor, Team& team, int jobs,
-                                   Progress& progress, std::function<bool()> interrupted)
-    : plan_(plan),
-      factor_(factor),
-      team_(team),
-      progress_(progress),
-      interrupted_(std::move(interrupted)),
-      sharing_(team, jobs, interrupted_),
-      compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, sharing_,
-                   [this](CompressionStage stage, double share) { return reach(name_of(stage), share); }) {}
-
-bool GreensCompressor::reach(const char* stage, double share) {
-  if (stage != stage_) progress_.begin(stage_ = stage);
-  progress_.reach(share);
-  return !interrupted_();
+void see_all(Team& team, ModelWriter& writer, bool reads) {
+  if (team.size() == 1) return;
+  writer.flush();
+  team.any(false);  // all have flushed
+  if (reads) writer.look_again();
 }
 
-bool GreensCompressor::solve_near(const PieceRange& part, ModelWriter& writer, TileCounts& counts) {
-  std::vector<Tile> tiles;
-  std::int64_t kept = 0;
-  double cost = 0.0, whole = 0.0;
-  for (const Tile& tile : near_tiles(plan_.frame)) {
-    whole += tile.cost;
-    if (tile.first < part.first || tile.first >= part.end) continue;
-    if (writer.has_near(static_cast<Index>(tile.first))) {
-      ++kept;
-      ++counts.kept;
-    } else {
-      cost += tile.cost;
-      tiles.push_back(tile);
-    }
-  }
-  if (kept > 0)
-    progress_.line(fmt::format("{}: those of {} of {} leaves were kept from earlier runs", near_stage, kept,
-                               part.end - part.first));
-  if (cost < whole) progress_.expect(near_stage, plan_.near_seconds * cost / whole);
-  progress_.begin(stage_ = near_stage);
-  std::vector<std::vector<float>> scratch(static_cast<std::size_t>(sharing_.jobs()));
-  double done = 0.0;
-  return team_.work(tiles, sharing_.jobs(),
-                    {[&](const Tile& tile, int worker) {
-                       std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
-                       compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
-                       writer.write_near(static_cast<Index>(tile.first), entries);
-                     },
-                     [&](const Tile& tile) {
-                       done += tile.cost;
-                       ++counts.solved;
-                       progress_.reach(done / cost);
-                     },
-                     interrupted_});
-}
-
-std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress(ModelWriter& writer) {
-  if (!compression_.prepare([&](Index leaf, std::span<float> entries) { writer.read_near(leaf, entries); }))
-    return nullptr;
-  double cut = cut_of_tolerance * plan_.frame.tolerance;
-  for (int attempt = 1;; ++attempt, cut *= finer) {
-    const std::shared_ptr<HierarchicalMatrix> matrix = compression_.compress(cut);
-    if (matrix == nullptr) return nullptr;
-    std::vector<TouchErrors> errors =
-        certify(*matrix, factor_, plan_.stored.dofs, plan_.places.points, plan_.places.touchable, touches,
-                certificate_seed, sharing_, [&](double share) { return reach(touch_stage, share); });
-    if (team_.any(interrupted_())) return nullptr;
-    const double worst = worst_of(errors);
-    if (worst <= accepted * plan_.frame.tolerance) {
-      loosen_bound(*matrix, errors);
-      matrix->tolerance = plan_.frame.tolerance;
-      matrix->certificate = table_of(errors);
-      progress_.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",
-                                 1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
-      return matrix;
-    }
-    if (attempt == most_cuts) {
-      throw OutOfReach(fmt::format("compressed, forces of random touches are off by up to {:.2g} of the "
-                                   "largest, the tolerance is {:.2g}",
-                                   worst, plan_.frame.tolerance),
-                       "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
-    }
-    progress_.line(
-        fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));
-  }
+std::optional<Solved> solve_compressed(const BakeRun& run, const CompressionPlan& plan, const Factor& factor,
+                                       const std::optional<BakePart>& part, ModelWriter& writer) {
+  if (SpreadNumbers* spread = factor.spread_numbers(); spread != nullptr)
+    return solve_compressed_alone(run, plan, factor, *spread, writer);
+  GreensCompressor compressor(run, plan, factor, writer);
+  const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
+  if (!compressor.solve_near(leaves)) return {};
+  Solved solved;
+  if (part) return solved;
+  see_all(run.team, writer, true);
+  solved.compressed = compressor.compress();
+  if (solved.compressed == nullptr) return {};
+  if (run.team.leads()) solved.probes = make_probes(factor, plan.stored.dofs);
+  return solved;
 }
 
 std::string certificate_text(const HierarchicalMatrix& matrix) {

@@ -2,30 +2,16 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/model.h"
-#include "formats/writer/model_writer.h"
+#include "precompute/columns.h"
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/compression.h"
-#include "precompute/description/description.h"
-#include "precompute/numerics/factor.h"
-#include "precompute/plan.h"
-#include "precompute/progress.h"
-#include "precompute/team.h"
-#include "precompute/team_sharing.h"
 
 namespace palpate {
-
-/// Stored nodes in the order of a file: the mesh node of each, and the dof of K of each of their dofs, -1 if
-/// held.
-struct StoredNumbering {
-  std::vector<Index> nodes;
-  std::vector<std::int64_t> dofs;
-};
 
 /// True if the description asks for compressed Green's functions with so many nodes. Throws Error for
 /// contradictory settings.
@@ -48,40 +34,22 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
                                  const StoredNumbering& stored, const Factor& factor, const Plan& dense,
                                  int jobs);
 
-/// Stages of `compress_greens`, with the expected seconds.
+/// The stages of `solve_compressed`, with the seconds that they are expected to take.
 std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks = 1);
 
 /// Leaves of near pairs; their cost is the number of their entries.
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame);
 
-/// Compression of the Green's functions of a plan.
-class GreensCompressor {
- public:
-  /// Keeps references to all arguments.
-  GreensCompressor(const CompressionPlan& plan, const Factor& factor, Team& team, int jobs,
-                   Progress& progress, std::function<bool()> interrupted);
+/// Makes the Green's functions of a plan, in all processes, with near pairs that the file has or gets, and
+/// measures random touches; where their forces are off by more than the tolerance, again with more terms. A
+/// part has some of the near pairs, and that is all. Nothing when interrupted. Throws OutOfReach, in all
+/// processes, where the tolerance is.
+std::optional<Solved> solve_compressed(const BakeRun& run, const CompressionPlan& plan, const Factor& factor,
+                                       const std::optional<BakePart>& part, ModelWriter& writer);
 
-  /// Solves for the near pairs of the leaves of `part` that the writer does not have yet, and writes them.
-  /// Adds to `counts`. Returns false if interrupted.
-  bool solve_near(const PieceRange& part, ModelWriter& writer, TileCounts& counts);
-
-  /// Computes the matrix, in all processes, from the near pairs of the file, which must be complete, and
-  /// measures random touches; if their force errors exceed the tolerance, repeats with more terms. Returns
-  /// null if interrupted. Throws OutOfReach, in all processes, if the tolerance cannot be met.
-  std::shared_ptr<const HierarchicalMatrix> compress(ModelWriter& writer);
-
- private:
-  bool reach(const char* stage, double share);
-
-  const CompressionPlan& plan_;
-  const Factor& factor_;
-  Team& team_;
-  Progress& progress_;
-  std::function<bool()> interrupted_;
-  TeamSharing sharing_;
-  const char* stage_ = nullptr;  // current stage
-  Compression compression_;
-};
+/// Makes data written by all processes, on any machine, visible to processes that read (`reads`). To the
+/// others the file may already be complete and renamed.
+void see_all(Team& team, ModelWriter& writer, bool reads);
 
 /// Certificate as a table, one line per number of nodes.
 std::string certificate_text(const HierarchicalMatrix& matrix);

@@ -34,8 +34,7 @@ constexpr double checksum_rate = 1e9;         // while the file is read back [by
 constexpr double solve_rate = 3.5e9;          // for one right-hand side [flop/s] (measured)
 constexpr double solves_for_precision = 900;  // for eight places of 30 nodes, and the smooth part
 constexpr double solves_at_the_end = 4;       // for the probes
-constexpr double solves_per_mode = 5;         // in block Lanczos, its products of vectors included (measured)
-constexpr double modes_alone = 0.4;           // fraction of these that each process does (measured)
+constexpr double solves_per_mode = 5;  // of Lanczos' method, its products of vectors among them (measured)
 constexpr double overlay_seconds_per_byte = 1e-8;    // for patches of two rings (measured)
 constexpr std::int64_t bytes_of_thread = 1'600'000;  // (measured)
 
@@ -128,11 +127,9 @@ double overlay_seconds(std::int64_t bytes, int jobs) {
   return overlay_seconds_per_byte * static_cast<double>(bytes) / working(jobs);
 }
 
-double modes_seconds(const Plan& plan, std::int64_t modes, int threads) {
-  constexpr int most = 2;  // solve at a time
-  const double share = modes_alone + (1.0 - modes_alone) / std::clamp(threads, 1, most);
-  const double solves = solves_per_mode * static_cast<double>(modes);
-  return share * solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
+double modes_seconds(const Plan& plan, std::int64_t modes) {
+  return solves_per_mode * static_cast<double>(modes) * 4.0 * static_cast<double>(plan.factor_entries) /
+         solve_rate;
 }
 
 std::int64_t expected_memory(const Plan& plan) {

@@ -43,8 +43,8 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
 /// Estimated time for overlays of so many bytes, condensed by `jobs` threads [s].
 double overlay_seconds(std::int64_t bytes, int jobs);
 
-/// Estimated time of block Lanczos for so many modes, with so many threads [s].
-double modes_seconds(const Plan& plan, std::int64_t modes, int threads);
+/// Time of Lanczos' method for so many modes [s].
+double modes_seconds(const Plan& plan, std::int64_t modes);
 
 /// Expected peak memory of the process [byte]: its memory when the plan is made, the factor, and the larger
 /// of workspaces and data written before these are allocated.

@@ -58,20 +58,19 @@ bool needs_more_memory(const Plan& plan, int ranks_here) {
   return available > 0 && expected_memory(plan) - resident_memory() > available;
 }
 
-void spread_likewise(const Factor& first, const SparseMatrix& K, Team& team, int jobs, Factor& factor) {
-  if (first.spread_numbers() != nullptr) factor.spread(team.spread(K, factor, jobs));
-}
-
-bool work_while_others_serve(SpreadNumbers& numbers, Team& team, const std::function<bool()>& interrupted,
-                             const LeadersWork& work) {
+bool work_while_others_serve(SpreadNumbers& numbers, const BakeRun& run,
+                             const std::function<bool(const BakeRun& leader)>& work) {
   bool whole = false;
-  if (team.leads()) {
-    whole = work([&] { return interrupted() || numbers.interrupted(); });
+  if (run.team.leads()) {
+    Team alone;
+    constexpr int one_thread = 1;  // only one solves with all processes
+    whole = work({run.description, run.options, alone, one_thread, run.progress, run.interrupt,
+                  [&] { return run.interrupted() || numbers.interrupted(); }, run.summary});
     numbers.release();
   } else {
-    numbers.serve(interrupted);
+    numbers.serve(run.interrupted);
   }
-  return !team.share(whole ? "whole" : "").empty();
+  return !run.team.share(whole ? "whole" : "").empty();
 }
 
 void spread_columns(SpreadNumbers& numbers, std::span<const std::int64_t> dofs, std::int64_t first,

@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "precompute/bake_run.h"
 #include "precompute/numerics/factor.h"
-#include "precompute/plan.h"
-#include "precompute/team.h"
 
 namespace palpate {
 
@@ -26,16 +25,10 @@ std::string text_of(const SpreadMemory& memory, bool used);
 /// True if a plan needs more memory than this process may use, with so many processes on this machine.
 bool needs_more_memory(const Plan& plan, int ranks_here);
 
-/// Distributes the numbers of a factor of K over the processes if those of `first` are distributed.
-void spread_likewise(const Factor& first, const SparseMatrix& K, Team& team, int jobs, Factor& factor);
-
-/// The leader's work, which gets a function that tests for interruption. Returns false if interrupted.
-using LeadersWork = std::function<bool(const std::function<bool()>& interrupted)>;
-
-/// The leader works while the other processes serve its solves until it is done. Returns false, in all, if
-/// one was interrupted.
-bool work_while_others_serve(SpreadNumbers& numbers, Team& team, const std::function<bool()>& interrupted,
-                             const LeadersWork& work);
+/// The leader works alone, with one thread and the requests of all to stop, and the others help it to solve
+/// until it is done. False, in all, when one was interrupted.
+bool work_while_others_serve(SpreadNumbers& numbers, const BakeRun& run,
+                             const std::function<bool(const BakeRun& leader)>& work);
 
 /// Columns [first, first + count) of the lower triangle of K^-1 restricted to `dofs` [rows], -1 for held
 /// rows: one after the other, each from its diagonal down, to `packed` (resized). In the leader, while the

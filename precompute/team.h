@@ -11,6 +11,7 @@
 #include "formats/journal.h"
 #include "precompute/machine/allotment.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -86,6 +87,22 @@ class Team {
 
  protected:
   std::function<void(const std::string&)> listener_ = [](const std::string&) {};
+};
+
+/// Threads of all processes of a team, which take items as they become free.
+class TeamSharing : public Sharing {
+ public:
+  /// `jobs`: threads of each process. No more items are begun once any process is `interrupted`.
+  TeamSharing(Team& team, int jobs, std::function<bool()> interrupted)
+      : team_(team), jobs_(jobs), interrupted_(std::move(interrupted)) {}
+
+  [[nodiscard]] int jobs() const override { return jobs_; }
+  bool for_each(const SharedItems& items) override;
+
+ private:
+  Team& team_;
+  int jobs_;
+  std::function<bool()> interrupted_;
 };
 
 }  // namespace palpate

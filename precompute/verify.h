@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "formats/model.h"
-#include "precompute/verify_check.h"
+#include "precompute/verify_matrix.h"
 
 namespace palpate {
 

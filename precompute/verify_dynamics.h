@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "precompute/numerics/assembly.h"
-#include "precompute/verify_check.h"
+#include "precompute/verify_matrix.h"
 
 namespace palpate {
 

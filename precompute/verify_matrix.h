@@ -7,9 +7,16 @@
 #include <vector>
 
 #include "precompute/numerics/precision.h"
-#include "precompute/verify_check.h"
 
 namespace palpate {
+
+/// One check: its largest relative error and the bound that it must keep.
+struct Check {
+  std::string name;
+  double error = 0.0;
+  double bound = 0.0;
+  [[nodiscard]] bool passed() const noexcept { return error <= bound; }  // false for NaN too
+};
 
 inline constexpr double solver_safety = 100.0;  ///< times `solver_error` is the allowed error of a column
 inline constexpr double sum_rounding = 1e-13;   ///< of sums of products, relative to the largest

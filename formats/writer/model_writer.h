@@ -10,11 +10,17 @@
 #include <string>
 #include <vector>
 
+#include "formats/content_hash.h"
+#include "formats/field_counts.h"
+#include "formats/journal.h"
 #include "formats/model.h"
+#include "formats/writer/piece_file.h"
 
 namespace palpate {
 
-struct BakePart;
+namespace hdf5 {
+class File;
+}
 
 /// A packed matrix that is streamed to disk.
 enum class PackedMatrix : std::uint8_t {
@@ -52,7 +58,6 @@ class ModelWriter {
   /// that process.
   ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
               const std::string& journal_text, std::function<void(const std::string& line)> report);
-  ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
 
@@ -104,8 +109,28 @@ class ModelWriter {
   void discard() noexcept;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+              const std::optional<BakePart>& part);
+  [[nodiscard]] JournalFrame examine(const Model& model);
+  void begin(const Model& model, Leftovers leftovers);
+  bool resume();
+  void start(const Model& model);
+  void write_body(const Model& model);
+  template <class From>
+  void store(std::size_t matrix, std::int64_t first, std::int64_t count, std::span<const From> values);
+  void seal(const std::vector<Probe>& probes, const std::shared_ptr<const HierarchicalMatrix>& compressed,
+            bool keeps);
+  void write_compressed(hdf5::File& file, const Model& extra);
+
+  std::filesystem::path path_;
+  FileHeader header_;
+  Counts counts_;
+  ContentHash content_;
+  ElementType element_;
+  std::int64_t order_;
+  PieceFile pieces_;
+  JournalFrame frame_;
+  std::optional<Journal> journal_;  // nullopt if another process has it
 };
 
 /// Takes over all that an interrupted run of the same model computed with a factor (rest displacements,

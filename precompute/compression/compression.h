@@ -9,13 +9,12 @@
 
 #include "matrices/hierarchical.h"
 #include "precompute/compression/cluster_pairs.h"
+#include "precompute/compression/far_pairs.h"
+#include "precompute/compression/selected_solver.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/sharing.h"
 
 namespace palpate {
-
-/// Number of random loads, which act on the whole body.
-inline constexpr Index random_loads = 256;
 
 /// Stages of a compression.
 enum class CompressionStage : std::uint8_t { near, samples, far };
@@ -42,7 +41,6 @@ class Compression {
   /// all arguments.
   Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
               const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress);
-  ~Compression();
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;
 
@@ -61,8 +59,20 @@ class Compression {
   std::shared_ptr<HierarchicalMatrix> compress(double cut);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] std::int64_t near_begin(Index leaf) const;
+  void solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace);
+  bool gather_near(const FetchNear& fetch);
+  bool sample();
+  bool check(HierarchicalMatrix& matrix);
+
+  SelectedSolver solver_;
+  std::span<const std::int64_t> stored_dofs_;
+  Sharing& sharing_;
+  CompressionProgress progress_;
+  HierarchicalMatrix matrix_;   // without far pairs
+  Eigen::VectorXd root_;        // [order] root of D, 0 where held
+  DoubleRows response_, load_;  // [order x (random_loads + checks)]
+  std::vector<SelectedSolver::Workspace> workspaces_;
 };
 
 /// Tree and pairs of a matrix that is yet to be computed.

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 
 #include "base/error.h"
 #include "precompute/numerics/lowest_modes.h"
@@ -13,22 +12,6 @@ namespace {
 
 constexpr double bytes_per_second = 10e9;  // rate at which a step reads K_bar^-1
 constexpr Index usual_modes = 100;
-
-/// K_bar^-1 of the stored dofs, column by column.
-template <class T>
-std::shared_ptr<const void> packed_inverse(const Factor& K_bar, std::span<const std::int64_t> stored_dofs) {
-  auto values = std::make_shared<std::vector<T>>();
-  values->reserve(static_cast<std::size_t>(packed_size(std::ssize(stored_dofs))));
-  for (std::size_t j = 0; j < stored_dofs.size(); ++j) {
-    std::vector<double> e(static_cast<std::size_t>(K_bar.order()), 0.0);
-    if (stored_dofs[j] >= 0) e[static_cast<std::size_t>(stored_dofs[j])] = 1.0;
-    const std::vector<double> x = K_bar.solve(e);
-    for (std::size_t i = j; i < stored_dofs.size(); ++i)
-      values->push_back(
-          static_cast<T>(stored_dofs[i] < 0 ? 0.0 : x[static_cast<std::size_t>(stored_dofs[i])]));
-  }
-  return {values, values->data()};
-}
 
 /// Rows of the shapes at the stored dofs, one mode after the other.
 std::vector<double> at_stored_dofs(const Eigen::MatrixXd& shapes, std::span<const std::int64_t> stored_dofs) {
@@ -121,7 +104,8 @@ MassAndDamping mass_and_damping(const SparseMatrix& K, const SparseMatrix& M, co
 std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
                                                 const SparseMatrix& K, const SparseMatrix& M,
                                                 const Factor& factor,
-                                                std::span<const std::int64_t> stored_dofs, Sharing& sharing) {
+                                                std::span<const std::int64_t> stored_dofs,
+                                                const std::function<bool()>& stopped) {
   StoredDynamics result;
   result.method = plan.method;
   result.lumped = options.lumped;
@@ -130,7 +114,7 @@ std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, 
   if (plan.method == DynamicsMethod::packed) {
     result.matrices = mass_and_damping(K, M, options.damping, stored_dofs);
   } else {
-    std::optional<Modes> modes = lowest_modes(factor, K, M, plan.modes, sharing);
+    std::optional<Modes> modes = lowest_modes(factor, K, M, plan.modes, stopped);
     if (!modes) return {};
     result.omega = std::move(modes->omega);
     result.shapes = at_stored_dofs(modes->shapes, stored_dofs);
@@ -145,28 +129,6 @@ std::vector<std::int64_t> stored_dofs_of(const Model& model, const Stiffness& st
     for (int axis = 0; axis < d; ++axis)
       dofs.push_back(stiffness.free_of_dof[static_cast<std::size_t>(std::int64_t{d} * node + axis)]);
   return dofs;
-}
-
-StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options, Precision precision) {
-  const ElasticBody body = elastic_body(model);
-  const Stiffness stiffness = assemble_stiffness(body);
-  const SparseMatrix M = assemble_mass(body, stiffness, options.lumped);
-  const std::vector<std::int64_t> stored_dofs = stored_dofs_of(model, stiffness);
-  const DynamicsPlan plan = plan_dynamics(options, model.scope, model.stored_dofs(), stiffness.K, precision);
-  Factor factor(stiffness.K, stiffness.node_start);
-  factor.factorize();
-  ThreadSharing alone(1);
-  StoredDynamics result = *describe_dynamics(options, plan, stiffness.K, M, factor, stored_dofs, alone);
-  if (plan.method != DynamicsMethod::packed) return result;
-
-  const SparseMatrix K_bar = effective_stiffness(stiffness.K, M, options.damping, options.newmark);
-  Factor factor_bar(K_bar, stiffness.node_start);
-  factor_bar.factorize();
-  result.inverse =
-      PackedGreens(has_float_entries(precision) ? packed_inverse<float>(factor_bar, stored_dofs)
-                                                : packed_inverse<double>(factor_bar, stored_dofs),
-                   model.stored_dofs(), precision);
-  return result;
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,7 +10,6 @@
 #include "precompute/description/description.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/numerics/factor.h"
-#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -32,17 +32,14 @@ DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int
 MassAndDamping mass_and_damping(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,
                                 std::span<const std::int64_t> stored_dofs);
 
-/// Computes everything except the packed inverse. `factor`: of K, computed. Returns nullopt if stopped.
+/// Everything but the packed inverse. `factor`: of K, computed. Nothing once `stopped`.
 std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
                                                 const SparseMatrix& K, const SparseMatrix& M,
                                                 const Factor& factor,
-                                                std::span<const std::int64_t> stored_dofs, Sharing& sharing);
+                                                std::span<const std::int64_t> stored_dofs,
+                                                const std::function<bool()>& stopped);
 
 /// Dof of K of each stored dof of the model, -1 if held.
 std::vector<std::int64_t> stored_dofs_of(const Model& model, const Stiffness& stiffness);
-
-/// Complete dynamics in memory for a model that has mesh, materials, held nodes, scope and stored nodes;
-/// K_bar^-1 in the given precision, by plain solves: for small models.
-StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options, Precision precision);
 
 }  // namespace palpate

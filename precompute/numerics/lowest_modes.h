@@ -3,11 +3,11 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "precompute/numerics/factor.h"
-#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -28,12 +28,12 @@ bool dense_modes(std::int64_t count, std::int64_t dofs) noexcept;
 /// Peak memory of lowest_modes [byte].
 std::int64_t modes_bytes(std::int64_t count, std::int64_t dofs) noexcept;
 
-/// The `count` <= n lowest modes, by block Lanczos on K^-1 M with thick restarts (Wu and Simon 2000); by a
-/// dense solver if they are more than a third of all. `factor`: of K, computed. K and M: lower triangles.
-/// Sylvester's law of inertia proves that none is missing. The bytes do not depend on the number of threads
-/// or processes. Nullopt if stopped. Throws Error if they cannot be found.
+/// The `count` <= n lowest modes, by Lanczos' method on K^-1 M with implicit restarts (Spectra), where they
+/// are more than a third of all by a dense solver. `factor`: of K, computed. K and M: lower triangles. That
+/// none is left out is proved by Sylvester's law of inertia. `stopped` is asked before each solve; nothing
+/// once it is true. Throws Error where they cannot be found.
 std::optional<Modes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
-                                  std::int64_t count, Sharing& sharing);
+                                  std::int64_t count, const std::function<bool()>& stopped);
 
 /// Number of omega^2 below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). `analysed`: K.
 /// Throws Error if a pivot is zero.

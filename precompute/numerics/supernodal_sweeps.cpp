@@ -106,19 +106,4 @@ void SupernodalSweeps::backward(const Supernode& s, bool on_path, std::int64_t a
               blas(s.columns), 1.0, L, blas(ld), X, blas(width));
 }
 
-void SupernodalSweeps::solve(double* B, std::int64_t width, Workspace& workspace) const {
-  prepare(workspace, width);
-  const std::span<const std::int64_t> order = factor_.permutation();
-  const std::int64_t n = factor_.order();
-  for (std::int64_t p = 0; p < n; ++p)
-    for (std::int64_t c = 0; c < width; ++c)
-      workspace.X[static_cast<std::size_t>(p * width + c)] = B[order[static_cast<std::size_t>(p)] + c * n];
-  for (const Supernode& s : supernodes_) forward(s, width, width, workspace);
-  for (auto s = supernodes_.rbegin(); s != supernodes_.rend(); ++s)
-    backward(*s, true, width, width, workspace);
-  for (std::int64_t p = 0; p < n; ++p)
-    for (std::int64_t c = 0; c < width; ++c)
-      B[order[static_cast<std::size_t>(p)] + c * n] = workspace.X[static_cast<std::size_t>(p * width + c)];
-}
-
 }  // namespace palpate

@@ -67,9 +67,6 @@ class SupernodalSweeps {
   void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
                 Workspace& workspace) const;
 
-  /// Replaces B [n, width], column-major, at the dofs of K, by K^-1 B. Allocates the workspace.
-  void solve(double* B, std::int64_t width, Workspace& workspace) const;
-
  private:
   const Factor& factor_;
   std::vector<Supernode> supernodes_;

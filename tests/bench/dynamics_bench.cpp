@@ -47,6 +47,7 @@
 #include "runtime/body/packed_newmark.h"
 #include "runtime/core/body/modal_newmark.h"
 #include "runtime/core/tick/step.h"
+#include "tests/support/make_dynamics.h"
 
 namespace palpate {
 namespace {
@@ -363,7 +364,7 @@ const Model& box_with_modes(int free_nodes) {
   DynamicsOptions options;
   options.method = DynamicsMethod::modal;
   options.modes = 200;
-  model.dynamics = make_dynamics(model, options, Precision::single_precision);
+  model.dynamics = test::make_dynamics(model, options, Precision::single_precision);
   return model;
 }
 

@@ -1,11 +1,11 @@
 // Work that processes share: here two teams of threads, who know of each other what they exchange alone.
-#include "precompute/team_sharing.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <barrier>
 #include <thread>
+
+#include "precompute/team.h"
 
 namespace palpate::team_sharing_test {
 namespace {

@@ -1,6 +1,4 @@
 // The time that is left of a precomputation, without a clock: `now` is told.
-#include "precompute/time_left.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 

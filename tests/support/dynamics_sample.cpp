@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "tests/support/make_dynamics.h"
+
 namespace palpate::test {
 
 Model swinging_model(ElementType element, const DynamicsOptions& options, Precision precision) {

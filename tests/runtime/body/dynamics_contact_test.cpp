@@ -10,6 +10,7 @@
 #include "runtime/body/packed_newmark.h"
 #include "tests/support/dense_algebra.h"
 #include "tests/support/dynamics_sample.h"
+#include "tests/support/make_dynamics.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::dynamics_contact_test {
@@ -225,7 +226,7 @@ TEST_P(Passivity, NothingIsGained) {
     for (Eigen::Index j = 0; j < Xi.cols(); ++j) Xi(i, j) = model.greens(i, j) / (5000.0 * 0.1);
   }
   model.greens = test::pack(Xi, Precision::double_precision);
-  model.dynamics = make_dynamics(model, options, Precision::double_precision);
+  model.dynamics = test::make_dynamics(model, options, Precision::double_precision);
   const double friction = 0.5 * stiffness * test::tick;  // of the device [N s/m]
   Loop loop(std::move(model), {.radius = 0.02, .coupling_stiffness = stiffness});
 
