@@ -16,7 +16,6 @@
 #include "runtime/app/play_session.h"
 #include "runtime/app/session_view.h"
 #include "runtime/app/viewed_play.h"
-#include "runtime/igtl/igtl_server.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/output.h"
@@ -64,12 +63,6 @@ OutputPaths check_outputs(PlayOptions& options) {
   return paths;
 }
 
-std::unique_ptr<IgtlServer> serve_igtl(ListeningSocket socket) {
-  const ListenAddress& address = socket.address();
-  say(stderr, "OpenIGTLink clients find the run at {}, port {}\n", address.address, address.port);
-  return std::make_unique<IgtlServer>(std::move(socket));
-}
-
 int exit_code(const LoopReport& report, bool recording_failed) {
   if (recording_failed) return exit_input_error;
   if (report.interrupted) return exit_interrupted;
@@ -94,8 +87,6 @@ int play(PlayOptions options) {
     if (beside) view.shows.push_back(options.beside);
     port.emplace(view);
   }
-  std::optional<ListeningSocket> igtl_socket;
-  if (options.igtl) igtl_socket.emplace(*options.igtl, "--igtl");
   InputSource input = make_input_source(options, guardian ? &*guardian : nullptr);
   std::unique_ptr<const Body> body =
       load_and_print(options.file, options.model_toml, options.settings.body());
@@ -103,10 +94,8 @@ int play(PlayOptions options) {
   if (options.session) warn_of_other_model(*options.session, *body);
   if (input.link != nullptr)
     wait_for(*input.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
-  std::unique_ptr<IgtlServer> igtl = igtl_socket ? serve_igtl(std::move(*igtl_socket)) : nullptr;
   if (port) {
-    ViewedPlay viewed(options, input, std::move(body), std::move(*port), beside ? &*beside : nullptr,
-                      igtl.get());
+    ViewedPlay viewed(options, input, std::move(body), std::move(*port), beside ? &*beside : nullptr);
     const LoopReport report = viewed.run(stop_asked);
     return exit_code(report, viewed.recording_failed());
   }
@@ -115,12 +104,7 @@ int play(PlayOptions options) {
   tell_small_tool(too_small(options.settings.tool, *body));
   options.settings = apply_defaults(options.settings, input, *body);
   print_device(input, options.settings);
-  SessionViewer viewer;
-  if (igtl != nullptr) {
-    igtl->show_scene(std::make_shared<const Scene>(make_scene(*body, 1)));
-    viewer.pictures = [&](SurfacePicture picture) { igtl->show_picture(std::move(picture), *body); };
-  }
-  PlaySession session(options, *body, input, viewer);
+  PlaySession session(options, *body, input);
   const LoopReport& report = session.run(stop_asked);
   session.tell();
   return exit_code(report, session.recording_failure().has_value());

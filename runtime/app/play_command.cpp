@@ -59,12 +59,6 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
       ->type_name("SESSION.mcap")
       ->group(viewer_group);
-  play.add_option(
-          "--igtl", arguments.igtl,
-          "send surface, tool and force to 3D Slicer and other OpenIGTLink clients, which look for them at "
-          "port 18944 if not told otherwise; default address: 127.0.0.1; port 0: any free one")
-      ->type_name("[ADDRESS:]PORT")
-      ->group(viewer_group);
 }
 
 void add_body(CLI::App& play, PlayArguments& arguments) {
@@ -182,9 +176,6 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   options.device = read_device(arguments.device, arguments.profile);
   if (arguments.view && arguments.fast)
     throw CLI::ValidationError("--fast", "what is shown keeps the clock: leave out --fast or --view");
-  if (arguments.igtl) options.igtl = read_address(*arguments.igtl, "--igtl");
-  if (arguments.igtl && arguments.fast)
-    throw CLI::ValidationError("--fast", "what is sent keeps the clock: leave out --fast or --igtl");
   const bool is_mouse = options.device.kind == DeviceChoice::Kind::mouse;
   if (is_mouse && !arguments.view)
     throw CLI::ValidationError("--device", "'mouse' is the pointer in a browser: give --view too");
@@ -208,17 +199,6 @@ double read_frame_rate(const std::optional<std::string>& text) {
 
 }  // namespace
 
-ListenAddress read_address(const std::string& text, const char* option) {
-  ListenAddress address;
-  const std::size_t colon = text.rfind(':');
-  if (colon != std::string::npos) address.address = text.substr(0, colon);
-  const std::optional<Index> port = parse_index(colon == std::string::npos ? text : text.substr(colon + 1));
-  if (!port || *port > UINT16_MAX || address.address.empty())
-    throw CLI::ValidationError(option, "'" + text + "' is not [ADDRESS:]PORT");
-  address.port = static_cast<std::uint16_t>(*port);
-  return address;
-}
-
 void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const char* group) {
   const std::array<CLI::Option*, 3> options = {
       command
@@ -240,9 +220,11 @@ void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const cha
 ViewerOptions read_viewer(const ViewerArguments& arguments) {
   ViewerOptions viewer;
   if (arguments.address) {
-    const ListenAddress place = read_address(*arguments.address, "--view-address");
-    viewer.address = place.address;
-    viewer.port = place.port;
+    const std::optional<ListenAddress> place = parse_listen_address(*arguments.address);
+    if (!place)
+      throw CLI::ValidationError("--view-address", "'" + *arguments.address + "' is not [ADDRESS:]PORT");
+    viewer.address = place->address;
+    viewer.port = place->port;
   }
   viewer.framed = arguments.framed;
   if (!arguments.told) return viewer;

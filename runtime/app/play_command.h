@@ -22,7 +22,6 @@ struct PlayArguments {
   bool view = false;
   ViewerArguments viewer;
   std::string beside;
-  std::optional<std::string> igtl;
   std::string record;
   std::optional<std::string> record_frames;
   std::string report;
@@ -40,9 +39,6 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
 /// Converts arguments to options. For a replay, missing ones are taken from the session. Throws
 /// CLI::ParseError for invalid arguments, Error for a session that cannot be read.
 PlayOptions read_play(PlayArguments arguments);
-
-/// Parses an address to listen on, "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
-ListenAddress read_address(const std::string& text, const char* option);
 
 /// Adds the options of a viewer's page to `push`, `play` or `view`.
 void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const char* group = nullptr);

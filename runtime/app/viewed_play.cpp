@@ -50,7 +50,7 @@ bool is_of_the_run(const Setting& setting) {
 }  // namespace
 
 ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body,
-                       ViewerPort port, SessionView* beside, IgtlServer* igtl)
+                       ViewerPort port, SessionView* beside)
     : options_(std::move(options)),
       input_(input),
       body_(std::move(body)),
@@ -60,7 +60,6 @@ ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<
       size_(body_->bounds().diagonal().norm()),
       port_(std::move(port)),
       beside_(beside),
-      igtl_(igtl),
       requested_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
   if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(input_, options_, *body_);
   state_.device = options_.device.text;
@@ -151,7 +150,6 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
                     .pictures =
                         [this](SurfacePicture picture) {
                           take_change(picture.frame);
-                          if (igtl_ != nullptr) igtl_->show_picture(picture, *body_);
                           server_->show_picture(std::move(picture), body_.get());
                         },
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
@@ -205,9 +203,7 @@ void ViewedPlay::show_body() {
     state_.defaults = describe_defaults(*body_);
     changed_ = true;
   }
-  const auto scene = std::make_shared<const Scene>(make_scene(*body_, number));
-  server_->show_scene(scene);
-  if (igtl_ != nullptr) igtl_->show_scene(scene);
+  server_->show_scene(std::make_shared<const Scene>(make_scene(*body_, number)));
   tell_.notify_all();
 }
 

@@ -16,7 +16,6 @@
 #include "runtime/app/play_session.h"
 #include "runtime/app/run_state.h"
 #include "runtime/app/session_view.h"
-#include "runtime/igtl/igtl_server.h"
 #include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 
@@ -27,11 +26,10 @@ namespace palpate {
 /// possible. If a request fails, the page gets the reason and the previous session is restarted.
 class ViewedPlay : public ViewedRun {
  public:
-  /// `input` comes from make_input_source, `body` is loaded by the options; `port`: address of the viewer;
-  /// `beside`: recording shown beside it; `igtl`: server that also receives the pictures. The last two must
-  /// outlive this; null for none.
+  /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown;
+  /// `beside`: a recording that is shown beside it, which lives as long; null for none.
   ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port,
-             SessionView* beside = nullptr, IgtlServer* igtl = nullptr);
+             SessionView* beside = nullptr);
 
   /// Serves the pages, prints the address once the first session could start, and continues until `stop` or
   /// the end of the duration. Writes the report of all sessions together and returns it. Throws Error. Must
@@ -92,7 +90,6 @@ class ViewedPlay : public ViewedRun {
   double size_;     // size of the body [m]
   ViewerPort port_;
   SessionView* beside_;
-  IgtlServer* igtl_;
   ViewerServer* server_ = nullptr;
   LoopControl control_;
   bool recording_failed_ = false;

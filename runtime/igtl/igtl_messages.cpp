@@ -1,21 +1,19 @@
 #include "runtime/igtl/igtl_messages.h"
 
 #include <fmt/format.h>
+#include <igtlMath.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <span>
-
-#include "runtime/scene/seen_surface.h"
 
 namespace palpate {
 namespace {
 
-constexpr double mm_per_m = 1e3;
+constexpr float mm_per_m = 1e3F;
 
 /// Packs a message and returns its bytes.
 std::string finish(igtl::MessageBase& message, const char* name, double time) {
@@ -28,80 +26,70 @@ std::string finish(igtl::MessageBase& message, const char* name, double time) {
           static_cast<std::size_t>(message.GetPackSize())};
 }
 
-/// Returns cells of `corners` nodes.
-igtl::PolyDataCellArray::Pointer cell_array(std::span<const Index> nodes, std::size_t corners) {
+igtl::PolyDataCellArray::Pointer cell_array(std::vector<std::uint32_t> nodes, std::size_t corners) {
   auto cells = igtl::PolyDataCellArray::New();
-  std::array<igtlUint32, 3> cell{};
-  for (std::size_t at = 0; at < nodes.size(); at += corners) {
-    for (std::size_t k = 0; k < corners; ++k) cell[k] = static_cast<igtlUint32>(nodes[at + k]);
-    cells->AddCell(static_cast<int>(corners), cell.data());
-  }
+  for (std::size_t at = 0; at < nodes.size(); at += corners)
+    cells->AddCell(static_cast<int>(corners), nodes.data() + at);
   return cells;
 }
 
-igtl::PolyDataPointArray::Pointer point_array(std::span<const Vec3> nodes) {
+igtl::PolyDataPointArray::Pointer point_array(const std::vector<std::array<float, 3>>& nodes) {
   auto points = igtl::PolyDataPointArray::New();
   points->SetNumberOfPoints(static_cast<int>(nodes.size()));
   for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const Eigen::Vector3f p = (mm_per_m * nodes[k]).cast<float>();
-    points->SetPoint(static_cast<unsigned>(k), p.x(), p.y(), p.z());
+    const auto& [x, y, z] = nodes[k];
+    points->SetPoint(static_cast<unsigned>(k), mm_per_m * x, mm_per_m * y, mm_per_m * z);
   }
   return points;
 }
 
-void add_scalars(igtl::PolyDataMessage& message, const char* name, std::span<const double> values) {
-  std::vector<igtlFloat32> numbers;
-  for (const double value : values) numbers.push_back(static_cast<igtlFloat32>(value));
+void add_scalars(igtl::PolyDataMessage& message, const char* name, std::vector<float> values) {
   auto attribute = igtl::PolyDataAttribute::New();
   attribute->SetType(igtl::PolyDataAttribute::POINT_SCALAR);
-  attribute->SetSize(static_cast<igtlUint32>(numbers.size()));
+  attribute->SetSize(static_cast<igtlUint32>(values.size()));
   attribute->SetName(name);
-  attribute->SetData(numbers.data());
+  attribute->SetData(values.data());
   message.AddAttribute(attribute);
 }
 
 }  // namespace
 
-std::string igtl_surface(const DrawnPicture& drawn) {
-  const SeenMesh mesh = seen_mesh(drawn.picture, *drawn.scene, drawn.patch.get());
+std::string igtl_surface(const WatchedPicture& picture) {
   auto message = igtl::PolyDataMessage::New();
-  message->SetPoints(point_array(mesh.nodes));
-  if (mesh.cell == ElementType::tri3) {
-    message->SetPolygons(cell_array(mesh.cells, 3));
+  message->SetPoints(point_array(picture.nodes));
+  auto cells = cell_array(picture.cells, picture.corners);
+  if (picture.corners == 3) {
+    message->SetPolygons(cells);
   } else {
-    message->SetLines(cell_array(mesh.cells, 2));
+    message->SetLines(cells);
   }
-  std::vector<double> size;  // magnitude of the displacement
-  for (std::size_t k = 0; k < mesh.nodes.size(); ++k)
-    size.push_back(mm_per_m * Eigen::Map<const Vec3>(mesh.displacement.data() + 3 * k).norm());
-  add_scalars(*message, "displacement [mm]", size);
-  add_scalars(*message, "von Mises stress [Pa]", mesh.von_mises);
-  add_scalars(*message, "contact pressure [Pa]", mesh.pressure);
-  return finish(*message, igtl_surface_name, drawn.picture.frame.time);
+  std::vector<float> displacement = picture.displacement;
+  for (float& size : displacement) size *= mm_per_m;
+  add_scalars(*message, "displacement [mm]", std::move(displacement));
+  add_scalars(*message, "von Mises stress [Pa]", picture.von_mises);
+  add_scalars(*message, "contact pressure [Pa]", picture.pressure);
+  return finish(*message, igtl_surface_name, picture.time);
 }
 
-std::string igtl_tool(const SurfacePicture& picture) {
-  const Eigen::Matrix3d rotation = picture.tool.orientation.toRotationMatrix();
+std::string igtl_tool(const WatchedPicture& picture) {
+  std::array<float, 4> quaternion{};
+  std::copy(picture.tool.begin() + 3, picture.tool.end(), quaternion.begin());
   igtl::Matrix4x4 matrix{};
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      matrix[row][column] = static_cast<float>(rotation(row, column));
-    matrix[row][3] = static_cast<float>(mm_per_m * picture.tool.position[row]);
-  }
-  matrix[3][3] = 1.0F;
+  igtl::QuaternionToMatrix(quaternion.data(), matrix);
+  for (std::size_t axis = 0; axis < 3; ++axis) matrix[axis][3] = mm_per_m * picture.tool[axis];
   auto message = igtl::TransformMessage::New();
   message->SetMatrix(matrix);
-  return finish(*message, igtl_tool_name, picture.frame.time);
+  return finish(*message, igtl_tool_name, picture.time);
 }
 
-std::string igtl_force(const SurfacePicture& picture) {
-  const Vec3 force = Vec3::Zero() - picture.on_body.force;
-  const Vec3 torque = Vec3::Zero() - picture.on_body.torque;
-  std::string text = fmt::format(R"({{"force_N":[{},{},{}],"torque_Nm":[{},{},{}]}})", force.x(), force.y(),
-                                 force.z(), torque.x(), torque.y(), torque.z());
+std::string igtl_force(const WatchedPicture& picture) {
+  const auto& [x, y, z] = picture.force;
+  const auto& [a, b, c] = picture.torque;
+  std::string text = fmt::format(R"({{"force_N":[{},{},{}],"torque_Nm":[{},{},{}]}})", 0 - x, 0 - y, 0 - z,
+                                 0 - a, 0 - b, 0 - c);
   auto message = igtl::StringMessage::New();
   message->SetString(text);
-  return finish(*message, igtl_force_name, picture.frame.time);
+  return finish(*message, igtl_force_name, picture.time);
 }
 
 }  // namespace palpate

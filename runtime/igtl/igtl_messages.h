@@ -1,9 +1,9 @@
-// Messages of OpenIGTLink, with version 1 of its header.
+// A picture as whole messages of OpenIGTLink, version 1 of its header.
 #pragma once
 
 #include <string>
 
-#include "runtime/scene/drawn_picture.h"
+#include "runtime/igtl/watched_picture.h"
 
 namespace palpate {
 
@@ -17,13 +17,13 @@ constexpr const char* igtl_force_name = "Palpate force";
 
 /// POLYDATA: the visible surface as triangles or, without any, as lines; per node the magnitude of its
 /// displacement [mm], von Mises stress and contact pressure [Pa].
-std::string igtl_surface(const DrawnPicture& drawn);
+std::string igtl_surface(const WatchedPicture& picture);
 
 /// TRANSFORM: pose of the tool.
-std::string igtl_tool(const SurfacePicture& picture);
+std::string igtl_tool(const WatchedPicture& picture);
 
 /// STRING: force on the hand and its torque about the tool's origin, as the JSON object
 /// {"force_N":[x,y,z],"torque_Nm":[x,y,z]}.
-std::string igtl_force(const SurfacePicture& picture);
+std::string igtl_force(const WatchedPicture& picture);
 
 }  // namespace palpate

@@ -1,25 +1,14 @@
 #include "runtime/igtl/igtl_server.h"
 
-#include <pthread.h>
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <chrono>
-#include <iterator>
-#include <mutex>
-#include <optional>
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <cstdint>
 #include <ranges>
-#include <thread>
 #include <utility>
-#include <vector>
 
-#include "runtime/igtl/igtl_broadcast.h"
-#include "runtime/igtl/igtl_client.h"
+#include "runtime/igtl/igtl_messages.h"
 
 namespace palpate {
 namespace {
@@ -27,160 +16,158 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
-using Clock = IgtlBroadcast::Clock;
+using Clock = std::chrono::steady_clock;
 
 constexpr auto tick_period = std::chrono::milliseconds(20);
-constexpr auto long_lag = std::chrono::milliseconds(500);  // lag at which a client gives way to a new one
+constexpr int pace_ticks = 250;                // 5 s
+constexpr std::size_t least_in_them = 80'000;  // [bytes]
 constexpr auto farewell = std::chrono::milliseconds(500);
-constexpr int niceness = 5;
-
-tcp protocol_of(const ListenAddress& address) {
-  return asio::ip::make_address(address.address).is_v6() ? tcp::v6() : tcp::v4();
-}
+constexpr int send_room = 256 << 10;              // what waits in it is seen late [bytes]
+constexpr std::size_t most_at_once = 64U << 10U;  // handed to the system before that is counted [bytes]
 
 }  // namespace
 
-struct IgtlServer::Impl {
-  explicit Impl(ListeningSocket socket)
-      : acceptor(context, protocol_of(socket.address()), socket.release()), timer(context) {
-    accept();
-    tick();
-    thread = std::thread([this] { work(); });
+/// Sends the newest picture whenever the one before is gone: a client that is slow misses pictures. What
+/// the client says is read and thrown away.
+class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
+ public:
+  /// `server` must live as long.
+  IgtlClient(tcp::socket socket, IgtlServer& server) : socket_(std::move(socket)), server_(server) {
+    error_code ignored;  // it does without
+    address_ = socket_.remote_endpoint(ignored).address();
+    socket_.set_option(tcp::no_delay(true), ignored);
+    socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
   }
 
-  void accept();
-  void tick();
-  void work();
-  void take_mail();
-  void drop_lost(Clock::time_point now);
-  void make_room(Clock::time_point now);
-  [[nodiscard]] bool is_over(Clock::time_point now) const;
+  void send_news() {
+    if (is_sending_ || is_lost_ || is_served()) return;
+    sending_ = server_.message();
+    pictures_ = server_.pictures();
+    is_sending_ = true;
+    asio::async_write(
+        socket_, asio::buffer(*sending_),
+        [self = shared_from_this(), before = handed_](const error_code& problem, std::size_t handed) {
+          self->handed_ = before + handed;
+          return problem ? 0 : most_at_once;
+        },
+        [self = shared_from_this()](const error_code& problem, std::size_t) {
+          self->is_sending_ = false;
+          self->is_lost_ |= problem.failed();
+          self->send_news();
+        });
+  }
 
-  // Written by any thread.
-  std::mutex mutex;
-  PictureDrawing drawing;
-  std::optional<DrawnPicture> mail;
+  void read() {
+    socket_.async_read_some(asio::buffer(said_),
+                            [self = shared_from_this()](const error_code& problem, std::size_t) {
+                              self->is_lost_ |= problem.failed();
+                              if (!self->is_lost_) self->read();
+                            });
+  }
 
-  // Used by the thread alone.
-  asio::io_context context{1};
-  tcp::acceptor acceptor;
-  asio::steady_timer timer;
-  IgtlBroadcast broadcast;
-  std::vector<std::shared_ptr<IgtlClient>> clients;
-  bool accept_failed = false;
-  std::optional<Clock::time_point> end;  // latest time to end, once requested
-  std::thread thread;
+  /// Counts a tick of the server, in whose number time is in which the server itself did not run.
+  void count_tick() {
+    if (is_sending_ && ++late_ticks_ < pace_ticks) return;
+    if (is_sending_ && handed_ - paced_ < least_in_them) is_lost_ = true;
+    late_ticks_ = 0;
+    paced_ = handed_;
+  }
+
+  /// It has closed the connection, or took less than 16 kB/s in five seconds in which there was more for it.
+  [[nodiscard]] bool is_lost() const noexcept { return is_lost_; }
+  [[nodiscard]] const asio::ip::address& address() const noexcept { return address_; }
+  /// It has been sent all there is.
+  [[nodiscard]] bool is_served() const { return !is_sending_ && pictures_ == server_.pictures(); }
+  void cut() {
+    is_lost_ = true;
+    error_code ignored;
+    socket_.close(ignored);
+  }
+
+ private:
+  tcp::socket socket_;
+  asio::ip::address address_;
+  IgtlServer& server_;
+  std::int64_t pictures_ = 0;  // of the server, when it was sent one last
+  std::shared_ptr<const std::string> sending_;
+  bool is_sending_ = false;
+  bool is_lost_ = false;
+  std::size_t handed_ = 0;  // bytes that the system took
+  std::size_t paced_ = 0;   // that it had when the pace was measured last
+  int late_ticks_ = 0;      // since then
+  std::array<char, 4096> said_{};
 };
 
-void IgtlServer::Impl::accept() {
-  acceptor.async_accept([this](const error_code& problem, tcp::socket socket) {
-    accept_failed = problem.failed();  // out of file descriptors: retry at the next tick
+IgtlServer::IgtlServer(asio::io_context& context, ListeningSocket socket)
+    : context_(context),
+      acceptor_(context, asio::ip::make_address(socket.address().address).is_v6() ? tcp::v6() : tcp::v4(),
+                socket.release()),
+      timer_(context) {
+  accept();
+  tick();
+}
+
+IgtlServer::~IgtlServer() = default;
+
+void IgtlServer::accept() {
+  acceptor_.async_accept([this](const error_code& problem, tcp::socket socket) {
+    accept_failed_ = problem.failed();  // no file is left for a connection: at the next tick there may be
     if (problem) return;
-    const Clock::time_point now = Clock::now();
-    drop_lost(now);  // the tick may be late
-    clients.push_back(std::make_shared<IgtlClient>(std::move(socket), broadcast));
-    if (clients.size() > most_igtl_clients) make_room(now);
-    clients.back()->send_news();
+    clients_.push_back(std::make_shared<IgtlClient>(std::move(socket), *this));
+    clients_.back()->read();
+    if (clients_.size() > most_igtl_clients) make_room();
+    for (const auto& client : clients_) client->send_news();
     accept();
   });
 }
 
-/// Reads from clients, removes lost ones, and sends deferred content.
-void IgtlServer::Impl::tick() {
-  timer.expires_after(tick_period);
-  timer.async_wait([this](const error_code&) {
+void IgtlServer::tick() {
+  timer_.expires_after(tick_period);
+  timer_.async_wait([this](const error_code&) {
     const Clock::time_point now = Clock::now();
-    broadcast.catch_up(now);
-    drop_lost(now);
-    for (const auto& client : clients) {
-      client->read_some();
-      client->send_news();
-    }
-    if (is_over(now)) {
-      for (const auto& client : clients) client->cut();
-      context.stop();
-      return;
-    }
-    if (std::exchange(accept_failed, false)) accept();
+    std::erase_if(clients_, [](const auto& client) {
+      client->count_tick();
+      if (client->is_lost()) client->cut();
+      return client->is_lost();
+    });
+    if (end_ && (now >= *end_ || std::ranges::all_of(clients_, &IgtlClient::is_served)))
+      return context_.stop();
+    if (std::exchange(accept_failed_, false)) accept();
     tick();
   });
 }
 
-void IgtlServer::Impl::drop_lost(Clock::time_point now) {
-  std::erase_if(clients, [now](const auto& client) {
-    client->look(now);
-    if (!client->is_lost()) return false;
-    client->cut();
-    return true;
-  });
+/// Cuts the newest client before the last of the address that has most, so that nobody keeps the others out,
+/// and who has watched long stays.
+void IgtlServer::make_room() {
+  const auto newest_first = std::views::reverse(clients_);
+  const auto most =
+      std::ranges::max_element(newest_first, {}, [this](const auto& client) {  // a tie: the last
+        return std::ranges::count(clients_, client->address(), &IgtlClient::address);
+      });
+  const auto out = std::ranges::find(newest_first.begin() + 1, newest_first.end(), (*most)->address(),
+                                     &IgtlClient::address);
+  const auto gone = out == newest_first.end() ? std::prev(clients_.end()) : std::prev(out.base());
+  (*gone)->cut();
+  clients_.erase(gone);
 }
 
-/// Closes the connection of the slowest client. If none is slow, closes the newest but one of the address
-/// with the most connections: one address cannot keep the others out, and clients connected for long stay.
-void IgtlServer::Impl::make_room(Clock::time_point now) {
-  auto out = std::ranges::max_element(clients, {}, [now](const auto& client) { return client->lag(now); });
-  if ((*out)->lag(now) < long_lag) {
-    const auto places = [this](const auto& client) {
-      return std::ranges::count(clients, client->address(), &IgtlClient::address);
-    };
-    const auto newest_first = std::views::reverse(clients);
-    const auto& most =
-        (*std::ranges::max_element(newest_first, {}, places))->address();  // in a tie, that of the last one
-    const auto newest =
-        std::ranges::find(newest_first.begin() + 1, newest_first.end(), most, &IgtlClient::address);
-    out = newest == newest_first.end() ? std::prev(clients.end()) : std::prev(newest.base());
-  }
-  (*out)->cut();
-  clients.erase(out);
+void IgtlServer::show(const WatchedPicture& picture) {
+  picture_ = picture;
+  ++pictures_;
+  message_.reset();
+  for (const auto& client : clients_) client->send_news();
 }
 
-bool IgtlServer::Impl::is_over(Clock::time_point now) const {
-  return end && (now >= *end || std::ranges::all_of(clients, &IgtlClient::is_served));
+const std::shared_ptr<const std::string>& IgtlServer::message() {
+  if (!message_)
+    message_ = std::make_shared<const std::string>(igtl_surface(picture_) + igtl_tool(picture_) +
+                                                   igtl_force(picture_));
+  return message_;
 }
 
-void IgtlServer::Impl::work() {
-  // It may have been started by the loop's thread.
-  const sched_param ordinary{};
-  pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
-  pthread_setname_np(pthread_self(), "igtl");
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), niceness);
-  context.run();
-}
-
-void IgtlServer::Impl::take_mail() {
-  std::optional<DrawnPicture> picture;
-  {
-    const std::lock_guard lock(mutex);
-    picture = std::exchange(mail, std::nullopt);
-  }
-  if (!picture) return;
-  broadcast.set_picture(std::move(*picture), Clock::now());
-  for (const auto& client : clients) client->send_news();
-}
-
-IgtlServer::IgtlServer(ListeningSocket socket) : impl_(std::make_unique<Impl>(std::move(socket))) {}
-
-IgtlServer::~IgtlServer() {
-  asio::post(impl_->context, [impl = impl_.get()] {
-    impl->broadcast.catch_up();
-    impl->end = Clock::now() + farewell;
-  });
-  impl_->thread.join();
-}
-
-void IgtlServer::show_scene(std::shared_ptr<const Scene> scene) {
-  const std::lock_guard lock(impl_->mutex);
-  impl_->drawing.set_scene(std::move(scene));
-}
-
-void IgtlServer::show_picture(SurfacePicture picture, const Body& body) {
-  {
-    const std::lock_guard lock(impl_->mutex);
-    std::optional<DrawnPicture> drawn = impl_->drawing.draw(std::move(picture), &body);
-    if (!drawn) return;
-    impl_->mail = std::move(drawn);
-  }
-  asio::post(impl_->context, [impl = impl_.get()] { impl->take_mail(); });
+void IgtlServer::finish() {
+  end_ = Clock::now() + farewell;
 }
 
 }  // namespace palpate

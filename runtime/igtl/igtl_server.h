@@ -1,9 +1,18 @@
 // Server for OpenIGTLink clients.
 #pragma once
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
-#include "runtime/scene/scene.h"
+#include "runtime/igtl/watched_picture.h"
 #include "runtime/serving/listening_socket.h"
 
 namespace palpate {
@@ -11,29 +20,42 @@ namespace palpate {
 /// Largest number of connected clients.
 constexpr std::size_t most_igtl_clients = 8;
 
-/// Sends surface, tool and force to all clients, from a thread of its own. If one more than
-/// `most_igtl_clients` connects, the slowest client is disconnected; if none is slow, the newest of the
-/// address with the most connections, counting the new one, gives way; if each address has one only, the new
-/// one is turned away. It sends no requests and accepts none. Any thread may call the `show` functions; they
-/// never wait for a client.
+class IgtlClient;
+
+/// Sends surface, tool and force of the newest picture to all clients. For one more than `most_igtl_clients`
+/// the newest of the address with the most connections, the new one counted, gives way to it: where each has
+/// only one, the new one is turned away. Asks nothing and obeys nothing. For the thread of the context.
 class IgtlServer {
  public:
-  /// Serves clients that already wait at the socket and later ones.
-  explicit IgtlServer(ListeningSocket socket);
-  /// Closes all connections, after the last picture if clients receive it within half a second.
+  /// Serves who waits at the socket and who comes later. `context` must live as long.
+  IgtlServer(boost::asio::io_context& context, ListeningSocket socket);
   ~IgtlServer();
   IgtlServer(const IgtlServer&) = delete;
   IgtlServer& operator=(const IgtlServer&) = delete;
 
-  /// Sets the scene of all pictures from now on.
-  void show_scene(std::shared_ptr<const Scene> scene);
-  /// Sends a picture; one without values for all nodes of the scene is ignored. `body`, to which the scene
-  /// belongs, is used only during the call to draw the picture's overlay.
-  void show_picture(SurfacePicture picture, const Body& body);
+  void show(const WatchedPicture& picture);
+  /// Stops the context once all clients have taken the last picture, after half a second at the latest.
+  void finish();
+
+  /// How many were shown.
+  [[nodiscard]] std::int64_t pictures() const noexcept { return pictures_; }
+  /// The last one as messages, which are made when the first client wants them.
+  [[nodiscard]] const std::shared_ptr<const std::string>& message();
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  void accept();
+  void tick();
+  void make_room();
+
+  boost::asio::io_context& context_;
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer timer_;
+  WatchedPicture picture_;
+  std::int64_t pictures_ = 0;
+  std::shared_ptr<const std::string> message_;
+  std::vector<std::shared_ptr<IgtlClient>> clients_;
+  bool accept_failed_ = false;
+  std::optional<std::chrono::steady_clock::time_point> end_;  // at the latest
 };
 
 }  // namespace palpate

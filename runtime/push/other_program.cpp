@@ -116,7 +116,7 @@ std::filesystem::path find_program(const std::string& name) {
     if (!folder.empty() && is_program(std::filesystem::path(folder) / name))
       return std::filesystem::path(folder) / name;
   throw Error(name + " is neither beside this program nor on the PATH", here.string(),
-              "install or build " + name + ", or add its folder to the PATH");
+              "install the package " + name + " or build it, or add its folder to the PATH");
 }
 
 OtherProgram::OtherProgram(const Start& start) : program_(start.program), leads_(!start.has_terminal) {

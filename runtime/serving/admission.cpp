@@ -107,7 +107,7 @@ bool is_same_token(std::string_view given, std::string_view token) noexcept {
 
 Target split_target(std::string_view target) {
   const std::size_t question = target.find('?');
-  Target result{target.substr(0, question), {}, {}};
+  Target result{target.substr(0, question), {}, {}, false};
   if (question == std::string_view::npos) return result;
   std::string_view rest = target.substr(question + 1);
   constexpr std::string_view token = "token=", nonce = "nonce=";
@@ -115,6 +115,7 @@ Target split_target(std::string_view target) {
     const std::size_t end = rest.find('&');
     const std::string_view part = rest.substr(0, end);
     if (part.starts_with(token)) result.token = part.substr(token.size());
+    if (part == "watch") result.watch = true;
     if (part.starts_with(nonce)) result.nonce = part.substr(nonce.size());
     rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
   }

@@ -31,10 +31,12 @@ std::string proof_of(const std::string& token, std::string_view nonce);
 /// Compares in constant time.
 bool is_same_token(std::string_view given, std::string_view token) noexcept;
 
-/// Target of a request: path before the `?`, and the values of `token` and `nonce` after it, empty if absent.
+/// What stands before the `?` of a request's target, and behind it the values of `token` and `nonce`, empty
+/// without, and whether `watch` is there.
 struct Target {
   std::string_view path;
   std::string_view token, nonce;
+  bool watch = false;
 };
 Target split_target(std::string_view target);
 

@@ -5,12 +5,25 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <charconv>
+#include <system_error>
 #include <utility>
 
 #include "base/error.h"
 #include "runtime/serving/admission.h"
 
 namespace palpate {
+
+std::optional<ListenAddress> parse_listen_address(const std::string& text) {
+  ListenAddress address;
+  const std::size_t colon = text.rfind(':');
+  if (colon != std::string::npos) address.address = text.substr(0, colon);
+  const char* const end = text.data() + text.size();
+  const auto [last, bad] =
+      std::from_chars(text.data() + (colon == std::string::npos ? 0 : colon + 1), end, address.port);
+  if (bad != std::errc() || last != end || address.address.empty()) return std::nullopt;
+  return address;
+}
 
 ListeningSocket::ListeningSocket(const ListenAddress& wanted, const char* who) : address_(wanted) {
   namespace asio = boost::asio;

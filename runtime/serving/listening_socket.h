@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace palpate {
@@ -11,8 +12,10 @@ struct ListenAddress {
   std::uint16_t port = 0;             ///< 0: any free port
 };
 
-/// Listening socket. A client that connects waits until a server takes the socket over, and is disconnected
-/// if the socket is destroyed instead.
+/// [ADDRESS:]PORT as a person writes it; nothing for all else.
+[[nodiscard]] std::optional<ListenAddress> parse_listen_address(const std::string& text);
+
+/// Who connects waits until a server has the socket, and is turned away when it is destroyed instead.
 class ListeningSocket {
  public:
   /// Throws Error (port in use, unknown address), in which `who` names the listener.

@@ -74,6 +74,10 @@ bool wants_socket(const Request& request, const ServedAddress& served) {
   return path_in_run(request, served) == "/socket" && beast::websocket::is_upgrade(request);
 }
 
+bool only_watches(const Request& request) {
+  return target_of(request).watch;
+}
+
 std::optional<Response> refusal(const Request& request, const ServedAddress& served) {
   if (std::optional<Response> refused = foreign_refusal(request, served)) return refused;
   if (request.method() != http::verb::get && request.method() != http::verb::head)

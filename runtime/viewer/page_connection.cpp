@@ -53,8 +53,10 @@ void PageConnection::leave() {
 }
 
 void PageConnection::open_socket() {
-  const bool offers = request().count(http::field::sec_websocket_protocol) > 0;
-  stream_.expires_never();  // the WebSocket has timeouts of its own
+  const Request& request = parser_->get();
+  only_watches_ = palpate::only_watches(request);
+  const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
+  stream_.expires_never();  // the socket has its own times
   socket_.emplace(std::move(stream_));
   websocket::stream_base::timeout times{};
   times.handshake_timeout = handshake_time;
@@ -220,7 +222,7 @@ Message PageConnection::next_picture() {
   if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();
   pictures_ = shown.pictures();
   ticks_first_ = true;
-  Message message = shown.frame_message(base_.get());
+  Message message = shown.frame_message(only_watches_ ? nullptr : base_.get());
   base_ = shown.values();
   note_picture(message);
   return message;

@@ -37,6 +37,9 @@ class PageConnection : public Connection, public Page {
   void look_alone(DrawnPicture picture, std::int64_t frame) override;
   void follow() override;
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept override;
+  [[nodiscard]] bool only_watches() const noexcept override { return only_watches_; }
+  /// The run that it asks for; null before it has shown the token.
+  [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   [[nodiscard]] bool is_stalled() const override;
 
  private:
@@ -56,6 +59,7 @@ class PageConnection : public Connection, public Page {
   const Served& served_;
   ShownRun* run_ = nullptr;  // that it asks for; null before it has shown the token
 
+  bool only_watches_ = false;
   bool is_open_ = false;
   std::deque<std::string> said_;
   std::size_t said_bytes_ = 0;

@@ -1,5 +1,6 @@
 #include "runtime/viewer/shown_run.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "base/error.h"
@@ -41,7 +42,7 @@ PageRole ShownRun::role(const Page& page) const {
 
 void ShownRun::join(Page& page) {
   open_.insert(&page);
-  if (open_.size() == 1) controller_ = &page;
+  if (!page.only_watches() && std::ranges::count(open_, false, &Page::only_watches) == 1) controller_ = &page;
   broadcast_.touch_state();
   page.say(hello_word(is_replay_ ? "replay" : "live", ++joined_, has_book_));
   show_all();

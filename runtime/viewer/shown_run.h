@@ -47,6 +47,8 @@ class Page {
   virtual void follow() = 0;
   /// Frame that it sees by itself.
   [[nodiscard]] virtual std::optional<std::int64_t> own_frame() const noexcept = 0;
+  /// It is a program's, to which control is not given unasked.
+  [[nodiscard]] virtual bool only_watches() const noexcept = 0;
 };
 
 /// Knows the pages that watch a run and the one that controls it, and takes the content posted to them. All
@@ -71,7 +73,7 @@ class ShownRun {
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
   [[nodiscard]] Broadcast& broadcast() noexcept { return broadcast_; }
   [[nodiscard]] PageRole role(const Page& page) const;
-  /// Adds a page whose WebSocket is open. The only page gets control.
+  /// It is a socket now: the only one of those that do not only watch has control.
   void join(Page& page);
   /// Removes a closed page, with its control.
   void leave(Page& page);

@@ -1,4 +1,4 @@
-"""palpate-runtime play --igtl: the protocol, unpacked here byte by byte, against the recording of the same run."""
+"""palpate-openigtlink: the protocol, unpacked here byte by byte, against the recording of the run that it watches."""
 
 import contextlib
 import json
@@ -11,10 +11,10 @@ import time
 
 import numpy
 
-from programs import PATIENCE, RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
+from programs import OPENIGTLINK, PATIENCE, RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
-TOUCH = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0.5,1.3,1,0,0,0\n0.5,0.52,0.47,1.05,0.8,0,0.6,0\n1.5,0.52,0.47,1.0,0.6,0,0.8,0\n"
+TOUCH = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0.5,1.3,1,0,0,0\n1,0.52,0.47,1.05,0.8,0,0.6,0\n3,0.52,0.47,1.0,0.6,0,0.8,0\n"
 PRESS = "t,x,y,z\n0,0.5,0.5,1.3\n0.3,0.5,0.5,1.05\n60,0.5,0.5,1.05\n"
 HEADER = struct.Struct(">H12s20sQQQ")
 
@@ -113,12 +113,31 @@ class Client:
 
 
 class IgtlTest(ProgramTest):
+    def start(self, *command):
+        """A process whose error stream is read."""
+        process = subprocess.Popen(list(map(str, command)), cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        return process
+
+    def told(self, process, pattern):
+        """What a line of its error stream has."""
+        said = ""
+        while not (found := re.search(pattern, said)):
+            line = process.stderr.readline()
+            self.assertTrue(line, said)
+            said += line
+        return found[1]
+
     @contextlib.contextmanager
     def playing(self, *arguments, script=PRESS):
-        """The process, its port, and a maker of clients, which end with it."""
+        """The run, the program that watches it, and a maker of clients, which end with it."""
         self.write("touch.csv", script)
-        process = subprocess.Popen([RUNTIME, "play", CUBE, "--tool", "sphere:0.1", "--igtl", "127.0.0.1:0", *map(str, arguments)],
-                                   cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        play = self.start(RUNTIME, "play", CUBE, "--tool", "sphere:0.1", "--view", "--view-address", "0", *arguments)
+        page = self.told(play, r"open (http\S+) in a browser")
+        program = self.start(OPENIGTLINK, page, "--listen", "127.0.0.1:0")
+        port = int(self.told(program, r"OpenIGTLink clients find the run at 127\.0\.0\.1, port (\d+)"))
         clients = []
 
         def connect():
@@ -126,27 +145,25 @@ class IgtlTest(ProgramTest):
             return clients[-1]
 
         try:
-            told = ""
-            while not (found := re.search(r"OpenIGTLink clients find the run at 127\.0\.0\.1, port (\d+)", told)):
-                line = process.stderr.readline()
-                self.assertTrue(line, told)
-                told += line
-            port = int(found[1])
-            yield process, connect
+            yield play, program, connect
         finally:
-            process.kill()
-            process.communicate()
             for client in clients:
                 client.close()
+
+    def end(self, process, status):
+        """Waits for it."""
+        process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, status)
 
 
 class Messages(IgtlTest):
     def test_are_what_the_run_recorded(self):
-        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.mcap", script=TOUCH) as (process, connect):
+        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.mcap", "--duration", "3",
+                          script=TOUCH) as (play, program, connect):
             client = connect()
             messages = list(iter(client.next, None))
-            process.communicate(timeout=PATIENCE)
-            self.assertEqual(process.returncode, 0)
+            self.end(play, 0)
+            self.end(program, 0)
         self.assertEqual({(message.kind, message.name) for message in messages},
                          {("POLYDATA", "Palpate surface"), ("TRANSFORM", "Palpate tool"), ("STRING", "Palpate force")})
         session = palpate.read(self.folder / "out.mcap")
@@ -164,15 +181,18 @@ class Messages(IgtlTest):
                 if abs(frames[frame] - message.time) > 1e-8:
                     continue  # dropped by one of both
                 nodes, cells, values = message.surface()
+                places = numpy.empty(len(nodes), int)  # of the surface's nodes, which pages have in an order of their own
+                places[triangles] = cells
                 displacement = shown["frames/displacement"][frame]
-                numpy.testing.assert_allclose(nodes, 1000 * (rest + displacement), rtol=0, atol=2e-4)
-                numpy.testing.assert_array_equal(cells, triangles)
-                numpy.testing.assert_allclose(values["displacement [mm]"], 1000 * numpy.linalg.norm(displacement, axis=1), rtol=1e-5, atol=1e-6)
+                rounding = 2e-4 + 0.1 * abs(displacement).max()  # 1/10 000 of it, in millimetres
+                numpy.testing.assert_allclose(nodes[places], 1000 * (rest + displacement), rtol=0, atol=rounding)
+                numpy.testing.assert_array_equal(numpy.sort(places), range(len(nodes)))
+                numpy.testing.assert_allclose(values["displacement [mm]"][places], 1000 * numpy.linalg.norm(displacement, axis=1), rtol=0, atol=2 * rounding)
                 # The recording's pictures are computed from its contact forces, which are in single precision.
-                for name, field in (("von Mises stress [Pa]", "von_mises"), ("contact pressure [Pa]", "pressure")):
+                for name, field, digits in (("von Mises stress [Pa]", "von_mises", 1 / 8192), ("contact pressure [Pa]", "pressure", 2e-6)):
                     recorded_values = shown[f"frames/{field}"][frame]
                     largest = numpy.nanmax(abs(recorded_values), initial=0)
-                    numpy.testing.assert_allclose(values[name], recorded_values, rtol=0, atol=2e-6 * largest)
+                    numpy.testing.assert_allclose(values[name][places], recorded_values, rtol=0, atol=digits * largest)
                 pressed = max(pressed, values["contact pressure [Pa]"].max())
             elif message.kind == "TRANSFORM":
                 rotation, position = message.pose()
@@ -182,31 +202,23 @@ class Messages(IgtlTest):
                 numpy.testing.assert_allclose(rotation @ rotation.T, numpy.eye(3), atol=1e-6)
             else:
                 told = json.loads(message.text())
-                numpy.testing.assert_array_equal(told["force_N"], -force[tick])  # which is on the body
-                numpy.testing.assert_array_equal(told["torque_Nm"], -torque[tick])
+                numpy.testing.assert_array_equal(numpy.float32(told["force_N"]), -numpy.float32(force[tick]))  # which is on the body
+                numpy.testing.assert_array_equal(numpy.float32(told["torque_Nm"]), -numpy.float32(torque[tick]))
             compared[message.kind] += 1
         self.assertGreater(min(compared.values()), 10)
         self.assertGreater(pressed, 0)
 
-    def test_at_most_thirty_surfaces_a_second(self):
-        with self.playing("--device", "script:touch.csv") as (_, connect):
-            times = [message.time for message in connect().surfaces(60)]
-        gaps = numpy.diff(times)
-        self.assertGreater(gaps.min(), 0)
-        # One that nothing followed for a tenth of a second on a busy machine may come sooner.
-        self.assertLessEqual(len(gaps) - 2, 30 * (times[-1] - times[0]))
-
-    def test_beside_the_viewer_a_live_body(self):
-        with self.playing("--view", "--view-address", "0", "--solver", "corotational", "--device", "script:touch.csv") as (process, connect):
+    def test_of_a_live_body(self):
+        with self.playing("--solver", "corotational", "--device", "script:touch.csv") as (play, program, connect):
             client = connect()
             for message in client.surfaces(3):
                 nodes, _, _ = message.surface()
                 self.assertTrue(numpy.isfinite(nodes).all())
                 self.assertLess(nodes.max(), 1500)
-            process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=PATIENCE)
-            self.assertEqual(process.returncode, 130)
+            play.send_signal(signal.SIGTERM)
+            self.end(play, 130)
             self.assertIsNone([*iter(client.next, None), None][-1])
+            self.end(program, 0)
 
 
 class Clients(IgtlTest):
@@ -214,7 +226,7 @@ class Clients(IgtlTest):
         query = HEADER.pack(1, b"GET_POLYDATA", b"Palpate surface", 0, 0, 0)
         huge = HEADER.pack(1, b"IMAGE", b"much", 0, 2**63, 7)
         stop = HEADER.pack(2, b"STT_POLYDATA", b"", 0, 0, 0)
-        with self.playing("--device", "script:touch.csv") as (process, connect):
+        with self.playing("--device", "script:touch.csv") as (play, program, connect):
             steady = connect()
             for said in (query, stop, huge, huge[:20], query[:57], bytes(range(256)) * 400, b"GET / HTTP/1.0\r\n\r\n"):
                 other = connect()
@@ -223,26 +235,25 @@ class Clients(IgtlTest):
                 other.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # hangs up with a reset
                 other.close()
                 steady.surfaces(2)
-            self.assertIsNone(process.poll())
-            process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
-            self.assertEqual(process.returncode, 130)
+            self.assertIsNone(program.poll())
+            program.send_signal(signal.SIGINT)
+            self.end(program, -signal.SIGINT)
+            self.assertIsNone(play.poll(), "the run goes on without it")
 
     def test_one_that_reads_nothing_costs_the_others_nothing(self):
-        with self.playing("--device", "script:touch.csv", "--duration", "3", "--report", "report.json") as (process, connect):
+        with self.playing("--device", "script:touch.csv", "--duration", "3", "--report", "report.json") as (play, _, connect):
             stalled = connect()
             readers = [connect() for _ in range(4)]
             for reader in readers:
                 reader.surfaces(30)
             self.assertIsNotNone(stalled)
-            process.communicate(timeout=PATIENCE)
-            self.assertEqual(process.returncode, 0)
+            self.end(play, 0)
         self.assertEqual(json.loads((self.folder / "report.json").read_text())["ticks"], 3000)
 
     def test_what_stands_is_sent_when_the_script_is_over(self):
-        with self.playing("--view", "--view-address", "0", "--device", "script:touch.csv", script=TOUCH) as (_, connect):
+        with self.playing("--device", "script:touch.csv", script=TOUCH) as (_, _, connect):
             first = connect()
-            while first.next().time < 1.4:
+            while first.next().time < 2.9:
                 pass
             time.sleep(1)
             late = connect()
@@ -250,26 +261,34 @@ class Clients(IgtlTest):
             tool = late.next()
             self.assertEqual(tool.kind, "TRANSFORM")
             self.assertEqual(surface.time, tool.time)
-            self.assertGreater(surface.time, 1.48)
+            self.assertGreater(surface.time, 2.98)
 
 
 class Refusals(IgtlTest):
-    def test_before_the_run_begins(self):
-        self.write("touch.csv", TOUCH)
-        play = (RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--record", "out.mcap")
+    PAGE = f"http://127.0.0.1:1/?token={'0' * 32}"
+
+    def test_of_places_to_listen_at(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
-            refused = run(*play, "--igtl", port, cwd=self.folder)
-            self.assert_refused(refused, f"127.0.0.1:{port}: cannot listen", "Choose another port")
-            self.assertNotIn("loaded in", refused.stderr, "the port is looked at first")
-        self.assert_refused(run(*play, "--igtl", "elsewhere:0", cwd=self.folder), "--igtl: 'elsewhere' is not an IP address", "127.0.0.1")
-        self.assert_refused(run(*play, "--igtl", "192.0.2.1:0", cwd=self.folder), "192.0.2.1:0: cannot listen")  # of no machine
-        self.assertFalse((self.folder / "out.mcap").exists())
+            self.assert_refused(run(OPENIGTLINK, self.PAGE, "--listen", port), f"127.0.0.1:{port}: cannot listen", "Choose another port")
+        self.assert_refused(run(OPENIGTLINK, self.PAGE, "--listen", "elsewhere:0"), "--listen: 'elsewhere' is not an IP address", "127.0.0.1")
+        self.assert_refused(run(OPENIGTLINK, self.PAGE, "--listen", "192.0.2.1:0"), "192.0.2.1:0: cannot listen")  # of no machine
 
-    def test_wrong_arguments(self):
-        self.write("touch.csv", TOUCH)
-        for arguments, piece in ((["--igtl=65536"], "'65536' is not [ADDRESS:]PORT"), (["--igtl=:18944"], "is not [ADDRESS:]PORT"),
-                                 (["--igtl", "0", "--fast"], "what is sent keeps the clock")):
-            result = run(RUNTIME, "play", CUBE, "--device", "script:touch.csv", *arguments, cwd=self.folder)
+    def test_of_pages_that_are_none(self):
+        def refused(page, *pieces):
+            self.assert_refused(run(OPENIGTLINK, page, "--listen", "0"), *pieces)
+        refused(self.PAGE, "127.0.0.1:1: cannot connect", "palpate-runtime play FILE --view")
+        for page in ("127.0.0.1:8017", "http://127.0.0.1:8017/", "http://127.0.0.1:8017?token=0", "https://127.0.0.1:8017/?token=0"):
+            refused(page, f"{page}: is not the address of a page", "palpate-runtime prints it")
+        self.write("touch.csv", PRESS)
+        play = self.start(RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--view", "--view-address", "0")
+        page = self.told(play, r"open (http\S+) in a browser")
+        refused(page[:-32] + "0" * 32, "does not let this program watch", "whole address")
+
+    def test_of_arguments(self):
+        for arguments, piece in ((["--listen=65536"], "'65536' is not [ADDRESS:]PORT"), (["--listen=:18944"], "is not [ADDRESS:]PORT"),
+                                 (["--lisen=0"], "Did you mean --listen?")):
+            result = run(OPENIGTLINK, self.PAGE, *arguments)
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn(piece, result.stderr)
+        self.assertEqual(run(OPENIGTLINK).returncode, 2)

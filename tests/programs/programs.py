@@ -17,6 +17,7 @@ SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
 BINARY = pathlib.Path(os.environ["PALPATE_BINARY_DIR"])
 PRECOMPUTE = BINARY / "precompute" / "palpate-precompute"
 RUNTIME = BINARY / "runtime" / "palpate-runtime"
+OPENIGTLINK = BINARY / "runtime" / "palpate-openigtlink"
 MODELS = SOURCE / "meshes" / "models"
 PATIENCE = 900  # [s] with what never comes; how long a thing takes is no test's
 os.environ["PATH"] = os.pathsep.join([str(PRECOMPUTE.parent), str(RUNTIME.parent), os.environ["PATH"]])

@@ -11,7 +11,7 @@ import struct
 import subprocess
 import threading
 
-from programs import PATIENCE, RUNTIME, SOURCE, ProgramTest
+from programs import OPENIGTLINK, PATIENCE, RUNTIME, SOURCE, ProgramTest
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
 MOST_MEMORY = 64 << 10  # [KiB] that strangers may cost
@@ -101,19 +101,18 @@ def memory_of(process):
 
 
 class Strangers(ProgramTest):
-    def start(self, *arguments):
-        """The process and what it says until all of its ports are told."""
-        process = subprocess.Popen([RUNTIME, *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+    def start(self, pattern, program, *arguments):
+        """The process and what it says of its port."""
+        process = subprocess.Popen([program, *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE)
         self.addCleanup(process.communicate)
         self.addCleanup(process.kill)
         told = b""
-        while not (found := re.search(rb"open http://127\.0\.0\.1:(\d+)/(gallery)?\?token=(\w+) in a browser", told)):
+        while not (found := re.search(pattern, told)):
             line = process.stderr.readline()
             self.assertTrue(line, told)
             told += line
-        igtl = re.search(rb"OpenIGTLink clients find the run at 127\.0\.0\.1, port (\d+)", told)
-        return process, int(found[1]), found[3].decode(), igtl and int(igtl[1])
+        return process, *(piece.decode() for piece in found.groups())
 
     def asked(self, port, path):
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
@@ -126,16 +125,19 @@ class Strangers(ProgramTest):
 
     def test_harm_nobody(self, deeds=1500, seed=1):
         self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,1.3\n0.3,0.5,0.5,1.05\n80000,0.5,0.5,1.05\n")
-        play, page, page_token, igtl = self.start("play", CUBE, "--view", "--view-address", "0", "--igtl", "0", "--device", "script:touch.csv",
-                                                  "--tool", "sphere:0.1")
+        pattern = rb"open http://127\.0\.0\.1:(\d+)/(?:gallery)?\?token=(\w+) in a browser"
+        play, page, page_token = self.start(pattern, RUNTIME, "play", CUBE, "--view", "--view-address", "0", "--device", "script:touch.csv",
+                                            "--tool", "sphere:0.1")
+        sends, igtl = self.start(rb"OpenIGTLink clients find the run at 127\.0\.0\.1, port (\d+)", OPENIGTLINK,
+                                 f"http://127.0.0.1:{page}/?token={page_token}", "--listen", "0")
         folder = self.folder / "shown"
         folder.mkdir()
         (folder / "cube.palpate.hdf").write_bytes(CUBE.read_bytes())
-        view, gallery, gallery_token, _ = self.start("view", folder, "--view-address", "0")
+        view, gallery, gallery_token = self.start(pattern, RUNTIME, "view", folder, "--view-address", "0")
         watcher = Watcher(igtl)
         self.asked(page, f"/?token={page_token}")
         self.asked(gallery, f"/scene?token={gallery_token}&name=cube.palpate.hdf")
-        before = {one: memory_of(one) for one in (play, view)}
+        before = {one: memory_of(one) for one in (play, sends, view)}
         crowd = Crowd((page, gallery, igtl), seed)
         self.addCleanup(crowd.leave)
         for deed in range(deeds):
@@ -153,7 +155,6 @@ class Strangers(ProgramTest):
             self.assertLess(memory_of(process) - memory, MOST_MEMORY)
             self.assertLess(len(os.listdir(f"/proc/{process.pid}/fd")), MOST_FILES)
         self.assertEqual(os.listdir(folder), ["cube.palpate.hdf"])
-        for process in before:
+        for process in (play, view):
             process.send_signal(signal.SIGTERM)
-            process.wait(PATIENCE)
-        self.assertEqual((play.returncode, view.returncode), (130, 0))
+        self.assertEqual([process.wait(PATIENCE) for process in (play, view, sends)], [130, 0, 0])

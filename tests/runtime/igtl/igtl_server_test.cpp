@@ -6,18 +6,13 @@
 #include <igtlPolyDataMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/read.hpp>
 #include <chrono>
-#include <csignal>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <random>
 #include <thread>
@@ -25,7 +20,6 @@
 #include "base/error.h"
 #include "runtime/igtl/igtl_messages.h"
 #include "tests/support/igtl_reader.h"
-#include "tests/support/runtime_model.h"
 
 namespace palpate::igtl_server_test {
 namespace {
@@ -55,53 +49,25 @@ class MachineReader {
   boost::asio::ip::tcp::socket socket_{context_};
 };
 
-/// Holds up the server's thread, as a busy machine does, for as long as it lives.
-class Stall {
- public:
-  Stall() {
-    struct sigaction handler {};
-    handler.sa_handler = [](int) {
-      is_held_ = true;
-      while (is_held_) usleep(1000);
-    };
-    sigaction(SIGUSR1, &handler, &before_);
-    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
-      std::string name;
-      std::getline(std::ifstream(task.path() / "comm"), name);
-      if (name == "igtl") syscall(SYS_tgkill, getpid(), std::stoi(task.path().filename()), SIGUSR1);
-    }
-    while (!is_held_) std::this_thread::yield();
-  }
-  Stall(const Stall&) = delete;
-  Stall& operator=(const Stall&) = delete;
-  ~Stall() {
-    is_held_ = false;
-    sigaction(SIGUSR1, &before_, nullptr);
-  }
-
- private:
-  static inline std::atomic<bool> is_held_ = false;
-  struct sigaction before_ {};
-};
-
-/// A server of a small body, and pictures of which each is a second later.
+/// A server in a thread of its own, and pictures of which each is a second later.
 class IgtlServing : public testing::Test {
  protected:
   void SetUp() override {
     ListeningSocket socket({}, "test");
     port_ = socket.address().port;
-    server_.emplace(std::move(socket));
-    server_->show_scene(std::make_shared<const Scene>(make_scene(body_, 1)));
+    server_.emplace(context_, std::move(socket));
+    thread_ = std::thread([this] { context_.run(); });
+  }
+  void TearDown() override {
+    context_.stop();
+    thread_.join();
   }
 
   /// The time of the picture that it shows.
-  double show() {
-    SurfacePicture picture;
-    picture.frame.displacement.assign(3 * body_.surface_in_mesh().size(), 0.001F);
-    picture.frame.von_mises.resize(body_.surface_in_mesh().size());
-    picture.frame.time = ++time_;
-    server_->show_picture(std::move(picture), body_);
-    return time_;
+  double show(double later = 1.0) {
+    picture_.time += later;
+    boost::asio::post(context_, [this, picture = picture_] { server_->show(picture); });
+    return picture_.time;
   }
 
   /// Whether the client is shown what comes.
@@ -114,12 +80,20 @@ class IgtlServing : public testing::Test {
     }
   }
 
-  Body body_{test::unit_model(3, 8, Scope::surface, Precision::double_precision)};
+  static constexpr std::size_t nodes = 386;
+  WatchedPicture picture_ = [] {
+    WatchedPicture picture;
+    picture.nodes.resize(nodes);
+    picture.cells = {0, 1, 2};
+    for (auto* values : {&picture.displacement, &picture.von_mises, &picture.pressure}) values->resize(nodes);
+    return picture;
+  }();
+  boost::asio::io_context context_{1};
   std::optional<IgtlServer> server_;
   int port_ = 0;
 
  private:
-  double time_ = 0.0;
+  std::thread thread_;
 };
 
 TEST_F(IgtlServing, SendsSurfaceToolAndForce) {
@@ -132,7 +106,7 @@ TEST_F(IgtlServing, SendsSurfaceToolAndForce) {
   EXPECT_EQ(test::time_of(*surface), shown);
   EXPECT_EQ(test::time_of(*tool), shown);
   EXPECT_EQ(test::time_of(*force), shown);
-  EXPECT_EQ(surface->GetPoints()->GetNumberOfPoints(), std::ssize(body_.surface_in_mesh()));
+  EXPECT_EQ(surface->GetPoints()->GetNumberOfPoints(), static_cast<int>(nodes));
 }
 
 TEST_F(IgtlServing, WhoComesLaterIsSentWhatStands) {
@@ -146,14 +120,12 @@ TEST_F(IgtlServing, WhoComesLaterIsSentWhatStands) {
 TEST_F(IgtlServing, ThePictureOfTheEndIsSent) {
   IgtlReader client(port_);
   expect_served(client);
-  SurfacePicture last;
-  last.frame.displacement.resize(3 * body_.surface_in_mesh().size());
-  last.frame.time = 1.001;  // sooner than the pace
-  server_->show_picture(std::move(last), body_);
-  server_.reset();
+  show(0.001);  // sooner than the pace
+  boost::asio::post(context_, [this] { server_->finish(); });
   double time = 0.0;
-  while (const auto surface = client.next<igtl::PolyDataMessage>()) time = test::time_of(*surface);
+  while (time < 1.0005) time = test::time_of(*client.next<igtl::PolyDataMessage>());
   EXPECT_NEAR(time, 1.001, 1e-9);
+  while (!context_.stopped()) std::this_thread::yield();
 }
 
 TEST_F(IgtlServing, OfEightOfOneMachineTheNewestGivesWay) {
@@ -249,11 +221,9 @@ TEST_F(IgtlServing, TimeInWhichTheServerIsHeldUpIsNoClients) {
     others.push_back(std::make_unique<MachineReader>(port_, "127.0.0.2"));
     EXPECT_TRUE(others.back()->is_served());
   }
-  std::optional<Stall> stall(std::in_place);
   show();
+  boost::asio::post(context_, [] { std::this_thread::sleep_for(std::chrono::seconds(6)); });
   others.push_back(std::make_unique<MachineReader>(port_, "127.0.0.2"));
-  std::this_thread::sleep_for(std::chrono::seconds(1));
-  stall.reset();
   EXPECT_TRUE(others.back()->is_served());
   expect_served(first);
 }

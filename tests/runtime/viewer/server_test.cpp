@@ -428,6 +428,20 @@ TEST_F(Viewer, PointerIsLostWithItsPage) {
   again.receive("state", is_controller);
 }
 
+TEST_F(Viewer, AProgramThatWatchesLeavesControlToThePage) {
+  server_->show_state("{}");
+  Client program = client({.query = served().query + "&watch"});
+  EXPECT_EQ(program.receive("state").at("you"), "watcher");
+  Client page = client();
+  page.receive("state", is_controller);
+  page.cut();
+  run_.wait_for("lose_pointer");
+  Client again = client();
+  again.receive("state", is_controller);
+  Client other = client();
+  EXPECT_EQ(other.receive("state").at("you"), "watcher");
+}
+
 TEST_F(Viewer, TellsThePageWhatCannotBe) {
   Client page = client();
   page.say(R"({"type":"change","settings":{"friction":"-1"}})");

@@ -281,6 +281,8 @@ TEST(Admission, TokensAndAddresses) {
   EXPECT_EQ(split_target("/socket?a=b&token=xy&c").path, "/socket");
   EXPECT_EQ(split_target("/socket?a=b&token=xy&c").token, "xy");
   EXPECT_EQ(split_target("/?atoken=xy").token, "");
+  EXPECT_TRUE(split_target("/socket?token=xy&watch").watch);
+  EXPECT_FALSE(split_target("/watch?token=watch").watch);
   EXPECT_EQ(split_target("/").path, "/");
 }
 
