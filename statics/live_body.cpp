@@ -73,15 +73,8 @@ LiveBody::LiveBody(LiveInput input, const LiveOptions& options)
   }
   find_points();
   find_loads();
-  if (options_.law == LiveLaw::mass_spring) {
-    springs_ = fitted_springs(input_.mesh, input_.materials, input_.material_of_element, input_.thickness);
-    std::vector<Index> ends;
-    for (const Spring& spring : springs_) ends.insert(ends.end(), {spring.a, spring.b});
-    pattern_ = TangentPattern(ends, 2, dimension(), free_of_dof_, free_dofs());
-  } else {
-    pattern_ =
-        TangentPattern(input_.mesh.connectivity, nodes_per_element_, dimension(), free_of_dof_, free_dofs());
-  }
+  pattern_ =
+      TangentPattern(input_.mesh.connectivity, nodes_per_element_, dimension(), free_of_dof_, free_dofs());
 }
 
 void LiveBody::check() const {
@@ -92,7 +85,7 @@ void LiveBody::check() const {
   check_from_zero("damping by mass", options_.damping.mass);
   check_from_zero("damping by stiffness", options_.damping.stiffness);
   if (!options_.gravity.allFinite()) refuse("gravity is not a number", "give it in m/s^2");
-  const bool has_strain = options_.law != LiveLaw::neo_hookean && options_.law != LiveLaw::mass_spring;
+  const bool has_strain = options_.law != LiveLaw::neo_hookean;
   if (plastic.flows() && !has_strain) {
     refuse(fmt::format("the {} law does not flow", name_of(options_.law)),
            "plasticity is for the corotational and the linear law");

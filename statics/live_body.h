@@ -10,7 +10,6 @@
 #include "meshes/material.h"
 #include "meshes/mesh.h"
 #include "statics/live_law.h"
-#include "statics/springs.h"
 #include "statics/tangent_pattern.h"
 
 namespace palpate {
@@ -56,8 +55,8 @@ struct LiveOptions {
 /// construction, usable from several threads. Positions, velocities and forces are [d N], dof d node + axis.
 class LiveBody {
  public:
-  /// Throws Error for springs on elements other than tri3 and tet4, for initial strain with a law that cannot
-  /// have it, for plasticity with a law that does not flow, and for numbers out of range.
+  /// Throws Error for initial strain where a law has no
+  /// place for it, for plasticity of a law that does not flow, and for numbers out of their range.
   LiveBody(LiveInput input, const LiveOptions& options);
 
   [[nodiscard]] const Mesh& mesh() const noexcept { return input_.mesh; }
@@ -91,7 +90,6 @@ class LiveBody {
   [[nodiscard]] const Mat3& initial_strain(Index element) const noexcept {
     return initial_strain_[input_.material_of_element[element]];
   }
-  [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }  ///< of mass_spring
   [[nodiscard]] const TangentPattern& pattern() const noexcept { return pattern_; }
 
  private:
@@ -109,7 +107,6 @@ class LiveBody {
   std::vector<double> weight_, gradient_;
   std::vector<LawConstants> constants_;  // [materials]
   std::vector<Mat3> initial_strain_;     // [materials]
-  std::vector<Spring> springs_;
   TangentPattern pattern_;
 };
 

@@ -34,60 +34,12 @@ Mat3 relaxed_strain(const LiveBody& body, std::span<const Mat3> plastic, Index e
   return plastic.empty() ? body.initial_strain(element) : Mat3(body.initial_strain(element) + plastic[point]);
 }
 
-/// Deformed spring: direction from a to b, and length.
-struct SpringState {
-  Vec3 direction;
-  double length;
-};
-
-SpringState spring_state(const LiveBody& body, const Eigen::VectorXd& x, const Spring& spring) noexcept {
-  const Eigen::Index d = body.dimension();
-  Vec3 along = Vec3::Zero();
-  along.head(d) = x.segment(d * Eigen::Index{spring.b}, d) - x.segment(d * Eigen::Index{spring.a}, d);
-  const double length = along.norm();
-  return {length > 0.0 ? Vec3(along / length) : Vec3(Vec3::UnitX()), length};
-}
-
-ForceSums spring_forces(const LiveBody& body, const Eigen::VectorXd& x, Eigen::VectorXd& f) {
-  const Eigen::Index d = body.dimension();
-  ForceSums sums;
-  for (const Spring& spring : body.springs()) {
-    const SpringState at = spring_state(body, x, spring);
-    const double stretch = at.length - spring.length;
-    sums.energy += 0.5 * spring.stiffness * stretch * stretch;
-    const Vec3 force = spring.stiffness * stretch * at.direction;
-    f.segment(d * Eigen::Index{spring.a}, d) += force.head(d);
-    f.segment(d * Eigen::Index{spring.b}, d) -= force.head(d);
-  }
-  for (Index e = 0; e < body.mesh().elements(); ++e) {
-    const NodeColumns columns = relative_positions(body, x, e);
-    if (!(gradient_at(body, columns, e * body.points()).determinant() > 0.0)) ++sums.inverted;
-  }
-  return sums;
-}
-
 void add_entries(std::span<const Index> places, const auto& K_cell, double* values) noexcept {
   std::size_t entry = 0;
   for (Eigen::Index p = 0; p < K_cell.rows(); ++p) {
     for (Eigen::Index q = 0; q <= p; ++q, ++entry) {
       if (places[entry] >= 0) values[places[entry]] += K_cell(p, q);
     }
-  }
-}
-
-void assemble_springs(const LiveBody& body, const Eigen::VectorXd& x, TangentKind kind, LiveMatrix& K) {
-  const Eigen::Index d = body.dimension();
-  for (Index k = 0; k < std::ssize(body.springs()); ++k) {
-    const Spring& spring = body.springs()[k];
-    const SpringState at = spring_state(body, x, spring);
-    double across = at.length > 0.0 ? 1.0 - spring.length / at.length : 0.0;
-    if (kind == TangentKind::positive) across = std::max(across, 0.0);
-    const Mat3 along = at.direction * at.direction.transpose();
-    const Mat3 block = spring.stiffness * (across * (Mat3::Identity() - along) + along);
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6> K_cell(2 * d, 2 * d);
-    K_cell.topLeftCorner(d, d) = K_cell.bottomRightCorner(d, d) = block.topLeftCorner(d, d);
-    K_cell.topRightCorner(d, d) = K_cell.bottomLeftCorner(d, d) = -block.topLeftCorner(d, d);
-    add_entries(body.pattern().places(k), K_cell, K.valuePtr());
   }
 }
 
@@ -115,7 +67,6 @@ Mat3 deformation_gradient(const LiveBody& body, const Eigen::VectorXd& x, Index 
 ForceSums internal_forces(const LiveBody& body, const Eigen::VectorXd& x, std::span<const Mat3> plastic,
                           Eigen::VectorXd& f) {
   f.setZero(body.dofs());
-  if (body.options().law == LiveLaw::mass_spring) return spring_forces(body, x, f);
   const Eigen::Index d = body.dimension();
   ForceSums sums;
   for (Index e = 0; e < body.mesh().elements(); ++e) {
@@ -140,7 +91,6 @@ void assemble_tangent(const LiveBody& body, const Eigen::VectorXd& x, std::span<
                       TangentKind kind, LiveMatrix& K) {
   if (K.nonZeros() != body.pattern().zero().nonZeros()) K = body.pattern().zero();
   std::fill_n(K.valuePtr(), K.nonZeros(), 0.0);
-  if (body.options().law == LiveLaw::mass_spring) return assemble_springs(body, x, kind, K);
   const Eigen::Index d = body.dimension();
   for (Index e = 0; e < body.mesh().elements(); ++e) {
     const NodeColumns columns = relative_positions(body, x, e);

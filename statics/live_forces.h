@@ -18,8 +18,8 @@ struct ForceSums {
 /// Deformation gradient at a quadrature point, in the plane with F_33 = 1. `x` [d N] positions [m].
 Mat3 deformation_gradient(const LiveBody& body, const Eigen::VectorXd& x, Index point) noexcept;
 
-/// f [d N] = -dE/dx, the forces of the elements or springs on their nodes, held ones included [N]. `plastic`:
-/// strain at each quadrature point, or empty for none.
+/// f [d N] = -dE/dx, the forces of the elements on their nodes, held ones too [N]. `plastic`
+/// strain of each quadrature point, or empty for none.
 ForceSums internal_forces(const LiveBody& body, const Eigen::VectorXd& x, std::span<const Mat3> plastic,
                           Eigen::VectorXd& f);
 

@@ -206,8 +206,6 @@ const char* name_of(LiveLaw law) noexcept {
       return "corotational-qr";
     case LiveLaw::neo_hookean:
       return "neo-hookean";
-    case LiveLaw::mass_spring:
-      return "mass-spring";
   }
   return "";
 }

@@ -15,10 +15,9 @@ enum class LiveLaw : std::uint8_t {
   corotational,     ///< linear in the frame of the nearest rotation
   corotational_qr,  ///< linear in the frame of a QR decomposition, as in Sito's thesis; for comparison
   neo_hookean,  ///< compressible: mu/2 (J^(-2/3) I1 - 3) + kappa/2 (J - 1)^2, as Abaqus and CalculiX have it
-  mass_spring,  ///< springs along the elements' edges (springs.h)
 };
 
-/// Names of the laws in options: linear, corotational, corotational-qr, neo-hookean, mass-spring.
+/// The names that users give: linear, corotational, corotational-qr, neo-hookean.
 const char* name_of(LiveLaw law) noexcept;
 
 /// Elastic constants in the form that the laws use.
@@ -46,11 +45,11 @@ enum class TangentKind : std::uint8_t {
   positive,  ///< an approximation without negative eigenvalues, whose steps go downhill
 };
 
-/// Energy and stress at F, in the plane with F_33 = 1. `relaxed` [3 x 3] is the stress-free strain in the
-/// rotated frame, initial plus plastic; for the linear and corotational laws. Finite for every finite F: the
-/// neo-Hookean law continues smoothly below a tenth of the rest volume. Not for mass_spring. The corotational
-/// P is the exact derivative of the energy, also if the axes of the relaxed strain differ from the stretch's:
-/// it then has a part beside R sigma that balances moments.
+/// Energy and stress at F, in the plane with F_33 = 1. `relaxed` [3 x 3] is the strain, in the rotated frame,
+/// at which there is no stress: initial and plastic; of linear and corotational laws. Finite for every finite
+/// F: the neo-Hookean law goes on smoothly where the volume is below a tenth of what it was. Of the
+/// corotational law P is the exact derivative of the energy, also where relaxed strain is turned against the
+/// stretch: then it has a part beside R sigma that keeps moments in balance.
 PointStress stress_at(LiveLaw law, const LawConstants& constants, const Mat3& F,
                       const Mat3& relaxed) noexcept;
 

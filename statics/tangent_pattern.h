@@ -12,8 +12,7 @@ namespace palpate {
 
 using LiveMatrix = Eigen::SparseMatrix<double>;  ///< of free dofs; only its lower triangle is stored
 
-/// Pattern of the sparse matrix that cells (elements or springs) sum up to, and the place of each of their
-/// entries.
+/// The sparse matrix that elements add up to, and where each of their entries goes.
 class TangentPattern {
  public:
   TangentPattern() = default;

@@ -190,27 +190,146 @@ void print_warp(const WarpTelling& warp) {
 void print_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
   const LiveCounts& counts = live.counts;
   say(stderr,
-      "solver: {}, {} steps by {}; {} were cut as they diverged, {} could not be made, {} had inverted "
+      "solver: {}, {} steps by {}; {} were cut as they diverged or would have, {} could not be made, {} had "
+      "inverted "
       "elements (at most {})\n",
       name_of(body.live()->body.options().law), counts.steps, name_of(body.live()->stepper.scheme.integrator),
       counts.halved, counts.stopped, counts.inverted, counts.most_inverted);
   say(stderr,
       "the tool met the compliance of {:.3g} s ago, renewed {} times and turned {} times; against the solver "
       "it was off by {:.2g} m and {:.2g} N at most, of forces up to {:.3g} N\n",
-      live.compliance_age, live.renewals, live.turns, live.largest_error,
-      std::max(live.largest_force_error, report.best_effort.largest_late_error), live.largest_force);
-  if (counts.near_limit > 0)
-    print_warning(fmt::format(
-        "the body stiffened: {} explicit steps of {:.3g} s were longer than nine tenths of the longest "
-        "stable "
-        "one, which was {:.3g} s at least, or were cut to it; give it a shorter --live-step or an implicit "
-        "--integrator",
-        counts.near_limit, body.live()->stepper.time_step, live.step_limit));
+      live.compliance_age, live.renewals, live.turns, live.largest_error, largest_force_error(live, report),
+      live.largest_force);
   if (counts.stopped > 0)
     print_warning(
         fmt::format("in {} steps the solver found no solution however short they were, and stopped the body "
                     "where it was: give it a shorter --live-step, more damping or less load",
                     counts.stopped));
+}
+
+Json json_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
+  const LiveCounts& counts = live.counts;
+  return {{"solver", name_of(body.live()->body.options().law)},
+          {"integrator", name_of(body.live()->stepper.scheme.integrator)},
+          {"step_s", body.live()->stepper.time_step},
+          {"steps", counts.steps},
+          {"steps_cut", counts.halved},
+          {"steps_stopped", counts.stopped},
+          {"steps_with_inverted_elements", counts.inverted},
+          {"most_inverted", counts.most_inverted},
+          {"plastic_work_J", counts.plastic_work},
+          {"compliance_age_s", live.compliance_age},
+          {"compliance_renewals", live.renewals},
+          {"compliance_turns", live.turns},
+          {"largest_error_m", live.largest_error},
+          {"last_error_m", live.last_error},
+          {"largest_force_error_N", largest_force_error(live, report)},
+          {"last_force_error_N", live.last_force_error},
+          {"largest_force_N", live.largest_force}};
+}
+
+Json json_dynamics(const Body& body, const MotionSource* motion) {
+  const bool is_warped = body.contact_model() == ContactModel::warped;
+  const bool is_dynamic = !is_warped && body.contact_model() != ContactModel::quasi_static;
+  Json json = {{"method", body.live() != nullptr ? "live"
+                          : is_warped            ? "none"
+                                                 : name_of(body.model().dynamics.method)},
+               {"contact", is_dynamic ? "dynamic" : "quasi-static"}};
+  if (motion != nullptr) {
+    json["steps"] = motion->steps();
+    json["longest_step_s"] = motion->longest_step();
+  }
+  return json;
+}
+
+/// How often each class of durations came: [upper end in ns, count], each twice as long as the one before.
+Json json_histogram(const TimeHistogram& histogram) {
+  Json json = Json::array();
+  std::int64_t from = 0;
+  for (std::int64_t to = 500; from <= histogram.worst(); to *= 2) {
+    json.push_back({to, histogram.total_between(from, to)});
+    from = to;
+  }
+  return json;
+}
+
+Json json_times(const TimeHistogram& histogram) {
+  return {{"median", histogram.percentile(0.5)},
+          {"p99_9", histogram.percentile(0.999)},
+          {"p99_99", histogram.percentile(0.9999)},
+          {"worst", histogram.worst()},
+          {"histogram", json_histogram(histogram)}};
+}
+
+Json json_safety(const LoopReport& report) {
+  Json faults;
+  for (std::size_t k = 1; k < fault_names.size(); ++k) faults[fault_names[k].second] = report.faults[k];
+  return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
+}
+
+/// Against the mesh, after the last tick.
+SurfaceChange last_change(const PlayedRun& run) {
+  const Body& body = run.body;
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  MotionSnapshot motion(body);
+  run.state.surface.motion.snapshot(motion);
+  surface_displacement(body, run.state.surface.near.load(), stored, u, &motion);
+  const std::vector<Vec3> mesh = body.surface_in_mesh();
+  for (std::size_t node = 0; node < u.size(); ++node)
+    u[node] += body.surface_rest_positions()[node] - mesh[node];
+  return surface_change(body.dimension(), body.simplices(), mesh, u);
+}
+
+Json json_surface(const PlayedRun& run) {
+  const SurfaceChange change = last_change(run);
+  const std::optional<double> studied = studied_rotation(run.body);
+  return {{"last_rotation_deg", degrees_a_radian * change.rotation},
+          {"last_strain", change.strain},
+          {"studied_rotation_deg", studied ? Json(degrees_a_radian * *studied) : Json()}};
+}
+
+Json json_device(const PlayedRun& run) {
+  Json json = {{"name", run.options.device.text}};
+  if (run.link != nullptr) {
+    json["description"] = run.link->name();
+    json["reports"] = run.link->reports();
+    json["writes"] = run.link->writes();
+    json["worst_write_ns"] = run.link->worst_write();
+    json["writes_without_loop"] = run.link->extrapolated();
+    json["opened_again"] = run.report.opened_again;
+    json["refused"] = run.link->refusals();
+  }
+  return json;
+}
+
+Json json_parts(const PlayedParts& parts) {
+  Json rows = Json::array();
+  for (const auto& row : parts.rows()) {
+    const std::string recording = row.part.recording.string();
+    rows.push_back({{"because", row.part.because},
+                    {"begun_s", row.begun},
+                    {"sessions", row.sessions},
+                    {"settings", row.part.settings},
+                    {"recording", recording.empty() ? Json() : Json(recording)},
+                    {"dropped_ticks", row.part.dropped},
+                    {"ticks", row.ticks},
+                    {"ticks_in_contact", row.ticks_in_contact},
+                    {"deadline_misses", row.misses},
+                    {"faults", row.faults},
+                    {"largest_force_N", row.largest_force},
+                    {"largest_shown_N", row.largest_shown}});
+  }
+  return rows;
+}
+
+Json json_replay(const ReplayDifference& replay) {
+  const bool differs = replay.first_tick >= 0;
+  return {{"ticks", replay.ticks},
+          {"different_ticks", replay.different},
+          {"largest_difference_N", replay.largest},
+          {"first_different_tick", differs ? Json(replay.first_tick) : Json()},
+          {"first_different_field", differs ? Json(replay.first_field) : Json()}};
 }
 
 }  // namespace

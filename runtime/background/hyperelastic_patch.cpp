@@ -90,10 +90,6 @@ HyperelasticPatch::HyperelasticPatch(const Body& body, PatchMesh mesh)
     at_rest_.segment(d * static_cast<Eigen::Index>(node), d) += mesh_.rest_displacement[node].head(d);
   internal_forces(live_, at_rest_, {}, rest_forces_);
   rounding_ = 1e-13 * linear_.norm() * (at_rest_.maxCoeff() - at_rest_.minCoeff());
-  rest();
-}
-
-void HyperelasticPatch::rest() {
   place_.u_Q = VectorXd::Zero(linear_.rows());
   place_.u_L = VectorXd::Zero(mesh_.free_dofs);
 }

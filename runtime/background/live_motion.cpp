@@ -170,7 +170,6 @@ double LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexc
   }
   const std::lock_guard lock(mutex_);
   telling_.counts.add(report);
-  telling_.step_limit = std::min(telling_.step_limit, report.limit);
   telling_.compliance_age = state_.time - compliance_.factored();
   telling_.renewals = compliance_.renewals();
   telling_.turns = compliance_.turns();

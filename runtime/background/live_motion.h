@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
 #include <mutex>
 #include <vector>
 
@@ -26,9 +25,7 @@ struct LiveTelling {
   /// the last step.
   double largest_force_error = 0.0;
   double last_force_error = 0.0;
-  /// Smallest stability limit of explicit integrators so far [s]; else infinity.
-  double step_limit = std::numeric_limits<double>::infinity();
-  double largest_force = 0.0;  ///< largest sum of the forces on the body at the end of a step [N]
+  double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
 };
 
 /// Measures the computing time of a live model's step beside the tick, by a trial under a small force [s].
@@ -49,7 +46,6 @@ class LiveMotion final : public MotionStepper {
   [[nodiscard]] std::shared_ptr<const Greens> compliance() const noexcept override {
     return compliance_.renewed();
   }
-  [[nodiscard]] bool is_near_limit() const noexcept override { return predicted_report_.is_near; }
   void tell_untouched(std::vector<double>& u) const noexcept override;
   [[nodiscard]] const LiveState& state() const noexcept { return state_; }
 

@@ -120,7 +120,6 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   sample.let_go = job.let_go;
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
   sample.compliance = stepper_->compliance();
-  sample.is_near_limit = stepper_->is_near_limit();
   stepper_->tell_untouched(sample.untouched);
   let_go_done_ = job.let_go;
   samples_.publish();

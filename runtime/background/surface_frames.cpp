@@ -73,13 +73,13 @@ void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noe
   state.surface.motion.snapshot(next.motion);
   take_contacts(state, next);
   const ToolState& tool = state.tools.front();
-  next.device = tool.device;
-  next.tool = tool.pose;
-  next.on_body = {Vec3::Zero() - tool.wrench.force, Vec3::Zero() - tool.wrench.torque};
-  next.status = state.status;
-  next.force_error = tool.force_error;
-  next.left_out = tool.left_out;
-  next.greens_error = tool.greens_error;
+  next.seen = {.device = tool.device,
+               .tool = tool.pose,
+               .on_body = {Vec3::Zero() - tool.wrench.force, Vec3::Zero() - tool.wrench.torque},
+               .status = state.status,
+               .force_error = tool.force_error,
+               .left_out = tool.left_out,
+               .greens_error = tool.greens_error};
   next.tick = tick;
   next.time = time;
   if (options_.in_background) {
@@ -142,13 +142,7 @@ void SurfaceFrames::compute(const Moment& moment) {
     picture.loads.time = moment.time;
     return sink_(std::move(picture));
   }
-  picture.device = moment.device;
-  picture.tool = moment.tool;
-  picture.on_body = moment.on_body;
-  picture.status = moment.status;
-  picture.force_error = moment.force_error;
-  picture.left_out = moment.left_out;
-  picture.greens_error = moment.greens_error;
+  static_cast<SeenTool&>(picture) = moment.seen;
   picture.patch = moment.load.patch;
   picture.frame.tick = moment.tick;
   picture.frame.time = moment.time;

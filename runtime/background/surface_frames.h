@@ -25,20 +25,24 @@ struct SurfaceFramesOptions {
   bool contacts_only = false;  ///< nothing is computed: pictures have only `loads`, tick and time
 };
 
-/// Picture of one moment.
-struct SurfacePicture {
-  SurfaceFrame frame;
-  ContactLoads loads;  ///< with SurfaceFramesOptions::contacts_only
-  ToolPose device;     ///< pose requested by the hand
-  ToolPose tool;       ///< actual pose
-  Wrench on_body;      ///< wrench on the body, opposite to that on the hand
+/// The tool at one moment.
+struct SeenTool {
+  ToolPose device{};  ///< where the hand wants the tool
+  ToolPose tool{};    ///< where it is
+  Wrench on_body{};   ///< the opposite of what the hand feels
   StepStatus status = StepStatus::ok;
-  double force_error = 0.0;            ///< possible error of the force if it is a best effort [N]
-  Index left_out = 0;                  ///< contact points beyond the capacity
-  double greens_error = 0.0;           ///< ToolState::greens_error [N]
-  std::vector<SeenContact> contacts;   ///< closed contacts
-  std::shared_ptr<const Patch> patch;  ///< null if there is no overlay
-  /// In the plane with all free nodes stored: values of all mesh nodes, without an overlay's refinement; else
+  double force_error = 0.0;   ///< how far the force may be off, where it is a best effort [N]
+  Index left_out = 0;         ///< contact points that found no room
+  double greens_error = 0.0;  ///< ToolState::greens_error [N]
+};
+
+/// What is seen at one moment.
+struct SurfacePicture : SeenTool {
+  SurfaceFrame frame;
+  ContactLoads loads;                  ///< SurfaceFramesOptions::contacts_only
+  std::vector<SeenContact> contacts;   ///< those that are closed
+  std::shared_ptr<const Patch> patch;  ///< null: no overlay
+  /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
   /// empty.
   std::vector<float> plane_displacement;  ///< [N x 3] displacement relative to the mesh [m]
   std::vector<float> plane_von_mises;     ///< [N] [Pa]
@@ -62,8 +66,7 @@ class SurfaceFrames {
 
  private:
   struct Moment {
-    ToolPose device{};
-    ToolPose tool{};
+    SeenTool seen{};
     SurfaceLoad load;
     MotionSnapshot motion;
     std::vector<SeenContact> touches;  // [most contacts] the first `touch_count`
@@ -72,13 +75,8 @@ class SurfaceFrames {
     std::size_t touch_count = 0;
     std::size_t press_count = 0;
     std::size_t force_count = 0;
-    Wrench on_body{};
     std::int64_t tick = -1;
     double time = 0.0;
-    StepStatus status = StepStatus::ok;
-    double force_error = 0.0;
-    Index left_out = 0;
-    double greens_error = 0.0;
   };
   /// Interior of a body in the plane.
   struct Interior {

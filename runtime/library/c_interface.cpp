@@ -43,7 +43,6 @@ static_assert(same(PALPATE_FORCE_LIMITED, StepStatus::force_limited));
 static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
 static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
 static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
-static_assert(same(PALPATE_NEAR_STEP_LIMIT, StepStatus::near_step_limit));
 static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
 static_assert(status_names.size() == 14, "these");
 

@@ -77,13 +77,12 @@ enum palpate_status {
   PALPATE_INSIDE_BODY = 1 << 6,       /* a tool started inside the body: no force until it is out */
   PALPATE_POSE_LIMITED = 1 << 7,      /* a pose jumped: the tool follows at a bounded speed */
   PALPATE_NOT_CONVERGED = 1 << 8,     /* the contact forces did not reach their tolerance within the budget */
-  PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was limited to max_force */
-  PALPATE_HANDING_OVER = 1 << 10,     /* a force approaches that of the contact gradually, to avoid a kick */
-  PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this position was not ready: an older one is used */
-  PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not ready in time */
-  PALPATE_RIGID_CONTACT = 1 << 13,    /* a tool presses on a rigid part: only its coupling deforms */
-  PALPATE_NEAR_STEP_LIMIT = 1 << 14,  /* a live body's explicit time step is close to the stability limit */
-  PALPATE_NOT_STEPPED = 1 << 15       /* no tick was done: the session is NULL or has ended, or another thread
+  PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was cut to max_force */
+  PALPATE_HANDING_OVER = 1 << 10,     /* a force is on its way to the contact's, so as not to kick */
+  PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
+  PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not there in time */
+  PALPATE_RIGID_CONTACT = 1 << 13,    /* a tool presses on what cannot move: only its coupling gives way */
+  PALPATE_NOT_STEPPED = 1 << 15       /* nothing happened: the session is NULL or has ended, or another thread
                                        * is in its loop */
 };
 

@@ -24,39 +24,22 @@ ImplicitStep::ImplicitStep(const LiveBody& body, const ImplicitOptions& options,
       damping_(A_) {}
 
 StepFactors step_factors(Integrator integrator, double h) {
-  if (integrator == Integrator::newmark) {
-    const Newmark scheme{.time_step = h};
-    return {.s = scheme.a0(), .t = scheme.a1()};
-  }
-  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the midpoint
+  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the middle
   const double t = 1.0 / (half ? 0.5 * h : h);
   return {.s = t * t, .t = t, .ahead = half ? 2.0 : 1.0};
 }
 
-ImplicitStep::Kinematics ImplicitStep::kinematics(const LiveState& state, double h) const {
-  Kinematics step{step_factors(options_.integrator, h), {}, {}};
-  if (options_.integrator == Integrator::newmark) {
-    const Newmark scheme{.time_step = h};
-    step.p = scheme.a2() * state.v + scheme.a3() * state.a;
-    step.q = scheme.a4() * state.v + scheme.a5() * state.a;
-  } else {
-    step.p = step.t * state.v;
-    step.q.setZero(state.x.size());
-  }
-  return step;
-}
-
-/// Computes the residual forces on free dofs and returns the potential of which they are the gradient [J].
+/// Fills the forces that are left on free dofs; the potential whose slope they are [J].
 double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
-                          const Kinematics& step) {
+                          const StepFactors& step) {
   const Eigen::VectorXd& M = body_.mass();
   const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
   double potential = sums.energy;
   inverted_ = std::max(inverted_, sums.inverted);
-  const Eigen::VectorXd acceleration = step.s * (x - state.x) - step.p;
+  const Eigen::VectorXd acceleration = step.s * (x - state.x) - step.t * state.v;
   inertia_ = M.cwiseProduct(acceleration);
   potential += 0.5 / step.s * inertia_.dot(acceleration);
-  const Eigen::VectorXd velocity = step.t * (x - state.x) - step.q;
+  const Eigen::VectorXd velocity = step.t * (x - state.x);
   const Rayleigh& damping = body_.options().damping;
   viscous_ = damping.mass * M.cwiseProduct(velocity);
   potential += 0.5 / step.t * viscous_.dot(velocity);
@@ -80,8 +63,8 @@ double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, cons
   return potential;
 }
 
-/// Sets A = s M + t C_d + K. False if it is not positive definite.
-bool ImplicitStep::set_matrix(const Eigen::VectorXd& x, const LiveState& state, const Kinematics& step,
+/// A = s M + t C_d + K. False when it is not positive definite.
+bool ImplicitStep::set_matrix(const Eigen::VectorXd& x, const LiveState& state, const StepFactors& step,
                               TangentKind kind) {
   assemble_tangent(body_, x, state.plastic, kind, K_);
   const Rayleigh& damping = body_.options().damping;
@@ -109,7 +92,7 @@ double ImplicitStep::share_left() const noexcept {
 
 /// Performs one Newton step, including wall forces. False if it does not reduce the residual.
 bool ImplicitStep::newton_step(Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
-                               const Kinematics& step, double& potential) {
+                               const StepFactors& step, double& potential) {
   if (!set_matrix(x, state, step, TangentKind::positive) || !solver_.solve(left_, change_)) return false;
   const Eigen::VectorXd from = x;
   const double slope = left_.dot(change_), before = left_.norm();
@@ -136,20 +119,12 @@ bool ImplicitStep::newton_step(Eigen::VectorXd& x, const LiveState& state, const
   return false;
 }
 
-/// Computes velocity and acceleration at the end of the step.
-void ImplicitStep::finish(const Eigen::VectorXd& x, const Eigen::VectorXd& push, const Kinematics& step,
-                          LiveState& state) {
+/// Position and velocity at the end of the step.
+void ImplicitStep::finish(const Eigen::VectorXd& x, const StepFactors& step, LiveState& state) {
   for (Index free = 0; free < body_.free_dofs(); ++free) {
     const Index dof = body_.dof_of_free()[free];
-    const double moved = x[dof] - state.x[dof], velocity = step.t * moved - step.q[dof];
-    if (options_.integrator == Integrator::newmark) {
-      state.v[dof] = velocity;
-      state.a[dof] = step.s * moved - step.p[dof] - wall_forces_[dof] / body_.mass()[dof];
-      state.x[dof] = x[dof];
-      continue;
-    }
-    state.v[dof] = step.ahead * velocity - (step.ahead - 1.0) * state.v[dof];
-    state.a[dof] = (forces_[dof] + body_.load()[dof] + push[dof]) / body_.mass()[dof];
+    const double moved = x[dof] - state.x[dof];
+    state.v[dof] = step.ahead * step.t * moved - (step.ahead - 1.0) * state.v[dof];
     state.x[dof] += step.ahead * moved;
   }
   if (options_.integrator == Integrator::implicit_euler) return;
@@ -162,7 +137,7 @@ void ImplicitStep::finish(const Eigen::VectorXd& x, const Eigen::VectorXd& push,
 }
 
 ImplicitReport ImplicitStep::advance(LiveState& state, double h, const Eigen::VectorXd& push) {
-  const Kinematics step = kinematics(state, h);
+  const StepFactors step = step_factors(options_.integrator, h);
   contacts_.begin(state.x);
   if (body_.options().damping.stiffness > 0.0) {
     assemble_tangent(body_, state.x, state.plastic, TangentKind::positive, damping_);
@@ -172,22 +147,14 @@ ImplicitReport ImplicitStep::advance(LiveState& state, double h, const Eigen::Ve
   inverted_ = 0;
   Eigen::VectorXd x = state.x;
   double potential = look(x, state, push, step);
-  ImplicitReport report;
-  while (report.newton < options_.most_newton) {
-    ++report.newton;
-    if (!newton_step(x, state, push, step, potential)) break;
-    report.residual = share_left();
-    report.converged = report.residual <= options_.tolerance;
-    if (report.converged) break;
+  for (int newton = 0; newton < options_.most_newton; ++newton) {
+    if (!newton_step(x, state, push, step, potential) || share_left() <= options_.tolerance) break;
   }
-  // Rounding can hide progress from the line search; then the residual decides. A single linear step is
-  // accepted as it is.
-  report.residual = share_left();
-  report.converged =
-      report.residual <= 100.0 * options_.tolerance || (options_.most_newton == 1 && x.allFinite());
-  report.inverted = inverted_;
-  finish(x, push, step, state);
-  return report;
+  // Rounding can hide progress from the line search: what is left then decides. One linear step is as it is.
+  const bool converged =
+      share_left() <= 100.0 * options_.tolerance || (options_.most_newton == 1 && x.allFinite());
+  finish(x, step, state);
+  return {converged, inverted_};
 }
 
 }  // namespace palpate

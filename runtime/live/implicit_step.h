@@ -19,13 +19,11 @@ struct ImplicitOptions {
 
 struct ImplicitReport {
   bool converged = false;
-  int newton = 0;         ///< number of Newton steps
-  double residual = 0.0;  ///< residual relative to the largest force, see `tolerance`
-  Index inverted = 0;     ///< largest number of inverted quadrature points during the step
+  Index inverted = 0;  ///< most quadrature points on the way
 };
 
-/// Coefficients of an implicit integrator: at the solved positions x, the velocity is t (x - x0) and the
-/// acceleration s (x - x0), plus terms from the previous state.
+/// What an implicit integrator makes of a step: at the positions x that it solves for, velocity is t (x - x0)
+/// and acceleration s (x - x0) - t v0.
 struct StepFactors {
   double s = 0.0;      ///< [1/s^2]
   double t = 0.0;      ///< [1/s]
@@ -33,10 +31,9 @@ struct StepFactors {
 };
 StepFactors step_factors(Integrator integrator, double h);
 
-/// Steps M x'' + C_d x' = f(x) + load by implicit Euler, the midpoint rule or Newmark's method, with walls.
-/// C_d = a M + b K with the positive tangent K at the beginning of the step. A is the matrix of the last
-/// Newton step, s M + t C_d + K: its inverse is the response of the positions at the end of the step to
-/// forces.
+/// Steps M x'' + C_d x' = f(x) + load by implicit Euler or the midpoint rule, in walls. C_d = a M + b K with
+/// K the positive tangent where the step begins. A is the matrix of Newton's last step, s M + t C_d + K: its
+/// inverse says how positions at the step's end follow forces.
 class ImplicitStep {
  public:
   ImplicitStep(const LiveBody& body, const ImplicitOptions& options, std::vector<Wall> walls);
@@ -49,20 +46,14 @@ class ImplicitStep {
   [[nodiscard]] const WallContacts& contacts() const noexcept { return contacts_; }
 
  private:
-  /// Velocity at x is t (x - x0) - q, acceleration s (x - x0) - p.
-  struct Kinematics : StepFactors {
-    Eigen::VectorXd p, q;
-  };
-
-  [[nodiscard]] Kinematics kinematics(const LiveState& state, double h) const;
   double look(const Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
-              const Kinematics& step);
-  bool set_matrix(const Eigen::VectorXd& x, const LiveState& state, const Kinematics& step, TangentKind kind);
+              const StepFactors& step);
+  bool set_matrix(const Eigen::VectorXd& x, const LiveState& state, const StepFactors& step,
+                  TangentKind kind);
   bool newton_step(Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
-                   const Kinematics& step, double& potential);
+                   const StepFactors& step, double& potential);
   [[nodiscard]] double share_left() const noexcept;
-  void finish(const Eigen::VectorXd& x, const Eigen::VectorXd& push, const Kinematics& step,
-              LiveState& state);
+  void finish(const Eigen::VectorXd& x, const StepFactors& step, LiveState& state);
 
   const LiveBody& body_;
   ImplicitOptions options_;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <string>
 #include <thread>
 #include <utility>
 
@@ -71,11 +70,6 @@ void use_poissons_ratio(const LiveSettings& settings, std::vector<Material>& mat
 }  // namespace
 
 LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
-  if (!answers_within_step(settings.integrator)) {
-    throw Error(std::string("by ") + name_of(settings.integrator) +
-                    " a step ends where it does whatever the forces in it: a tool would not be felt",
-                "--integrator", "take semi-implicit-euler or another one");
-  }
   LiveInput input = live_input(model);
   if (settings.free) {
     input.fixed.clear();

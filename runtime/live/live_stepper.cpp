@@ -11,16 +11,14 @@
 namespace palpate {
 namespace {
 
-constexpr int most_depth = 8;          // nested halvings
-constexpr int rounds_at_rest = 300;    // iterations of the power method
-constexpr int rounds_between = 4;      // iterations per check
-constexpr std::int64_t look_each = 4;  // steps between checks
-constexpr double near_share = 0.9;     // fraction of the limit
+constexpr int most_depth = 8;          // of halving
+constexpr int rounds_at_rest = 300;    // of the power iteration
+constexpr int rounds_between = 4;      // at each look
+constexpr std::int64_t look_each = 4;  // steps
 
 double limit_at(const LiveBody& body, const StepperOptions& options, LargestFrequency& frequency) {
   if (is_implicit(options.scheme.integrator)) return std::numeric_limits<double>::infinity();
-  return longest_step_at(body, options.scheme.integrator,
-                         frequency.estimate(body.start(), {}, rounds_at_rest));
+  return longest_step_at(body, frequency.estimate(body.start(), {}, rounds_at_rest));
 }
 
 }  // namespace
@@ -30,20 +28,14 @@ LiveStepper::LiveStepper(const LiveBody& body, const StepperOptions& options)
       options_(options),
       implicit_(body, options.scheme, options.walls),
       frequency_(body),
-      limit_at_rest_(limit_at(body, options, frequency_)),
-      limit_(limit_at_rest_),
+      limit_(limit_at(body, options, frequency_)),
       none_(Eigen::VectorXd::Zero(body.dofs())) {
-  const char* name = name_of(options.scheme.integrator);
   if (!(options.time_step > 0.0) || !std::isfinite(options.time_step))
     throw Error(fmt::format("the time step is {} s", options.time_step), "live body",
                 "give a positive time, e.g. 0.001");
-  if (options.time_step <= limit_at_rest_) return;
-  if (limit_at_rest_ == 0.0) {
-    throw Error(fmt::format("{} grows in steps of any length on a body without damping", name), "live body",
-                "take semi-implicit-euler, verlet, rk4 or an implicit integrator, or give the body damping");
-  }
+  if (options.time_step <= limit_) return;
   throw Error(fmt::format("steps of {:.4g} s by {} are unstable: the longest stable one is {:.4g} s",
-                          options.time_step, name, limit_at_rest_),
+                          options.time_step, name_of(options.scheme.integrator), limit_),
               "live body", "take shorter steps, a softer or coarser body, or an implicit integrator");
 }
 
@@ -53,7 +45,6 @@ void LiveCounts::add(const LiveReport& report) noexcept {
   if (!report.whole) ++stopped;
   if (report.inverted > 0) ++inverted;
   most_inverted = std::max(most_inverted, report.inverted);
-  if (report.is_near) ++near_limit;
   plastic_work += report.flow.work;
 }
 
@@ -61,10 +52,8 @@ LiveReport LiveStepper::step(LiveState& state, const Eigen::VectorXd& push) {
   LiveReport report;
   report.parts = 0;
   const double end = state.time + options_.time_step;
-  if (!is_implicit(options_.scheme.integrator)) watch_limit(state, report);
-  report.limit = limit_;
-  if (options_.scheme.integrator == Integrator::newmark && !state.has_acceleration)
-    find_acceleration(state, push.size() > 0 ? push : none_);
+  if (!is_implicit(options_.scheme.integrator) && counts_.steps % look_each == 0)
+    limit_ = longest_step_at(body_, frequency_.estimate(state.x, state.plastic, rounds_between));
   // A body that has become stiffer takes shorter steps.
   const double parts = std::min(std::ceil(options_.time_step / limit_), 64.0);
   const double h = options_.time_step / std::max(parts, 1.0);
@@ -78,25 +67,7 @@ LiveReport LiveStepper::step(LiveState& state, const Eigen::VectorXd& push) {
   return report;
 }
 
-/// Solves M a = f - C_d v for the free dofs.
-void LiveStepper::find_acceleration(LiveState& state, const Eigen::VectorXd& push) {
-  internal_forces(body_, state.x, state.plastic, forces_);
-  forces_ += body_.load() + push;
-  add_damping_forces(body_, state.x, state.v, state.plastic, forces_);
-  for (const Index dof : body_.dof_of_free()) state.a[dof] = forces_[dof] / body_.mass()[dof];
-  state.has_acceleration = true;
-}
-
-void LiveStepper::watch_limit(const LiveState& state, LiveReport& report) {
-  if (counts_.steps % look_each == 0) {
-    const double omega = frequency_.estimate(state.x, state.plastic, rounds_between);
-    limit_ = longest_step_at(body_, options_.scheme.integrator, omega);
-  }
-  report.is_near = options_.time_step > near_share * limit_;
-}
-
-/// Performs one step of h, or two halves of it. False if the shortest ones diverge too: the body is then
-/// stopped.
+/// One step of h, or two halves of it. False when the shortest ones diverge too: the body then stands still.
 bool LiveStepper::advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth,
                           LiveReport& report) {
   const LiveState before = state;
@@ -110,7 +81,6 @@ bool LiveStepper::advance(LiveState& state, double h, const Eigen::VectorXd& pus
            advance(state, 0.5 * h, push, depth + 1, report);
   }
   state.v.setZero();
-  state.a.setZero();
   ++report.parts;
   return false;
 }
@@ -119,48 +89,39 @@ bool LiveStepper::advance_once(LiveState& state, double h, const Eigen::VectorXd
   bool whole = true;
   if (is_implicit(options_.scheme.integrator)) {
     const ImplicitReport implicit = implicit_.advance(state, h, push);
-    report.newton += implicit.newton;
     report.contacts = implicit_.contacts().closed();
     report.inverted = std::max(report.inverted, implicit.inverted);
     whole = implicit.converged;
   } else {
     whole = advance_explicitly(state, h, push, report);
   }
-  if (!whole || !state.x.allFinite() || !state.v.allFinite()) return false;
-  return true;
+  return whole && state.x.allFinite() && state.v.allFinite();
 }
 
+/// By semi-implicit Euler.
 bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push,
                                      LiveReport& report) {
   const Eigen::VectorXd from = state.x;
-  double energy_before = -1.0, energy = 0.0;
-  // Forces are evaluated with the walls' constraints applied: inside walls, stiffness and damping would throw
-  // back nodes that merely come to rest there, and friction would have no effect.
-  const auto accelerate = [&](Eigen::VectorXd x, Eigen::VectorXd v) {
-    if (!options_.walls.empty()) {
-      Eigen::VectorXd any = v, end = from + h * v;
-      meet_walls(from, h, x, any);
-      meet_walls(from, h, end, v);
-    }
-    const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
-    energy = sums.energy;
-    report.inverted = std::max(report.inverted, sums.inverted);
-    if (energy_before < 0.0) energy_before = energy;
-    forces_ += body_.load() + push;
-    add_damping_forces(body_, x, v, state.plastic, forces_);
-    Eigen::VectorXd a = forces_.cwiseQuotient(body_.mass());
-    for (Eigen::Index dof = 0; dof < a.size(); ++dof) {
-      if (body_.free_of_dof()[static_cast<std::size_t>(dof)] < 0) a[dof] = 0.0;
-    }
-    return a;
-  };
+  // Forces are those of the body as walls let it be and move: within them, stiffness and damping throw back
+  // nodes that only come to rest there, and friction has nothing to hold them by.
+  Eigen::VectorXd x = from, v = state.v;
+  if (!options_.walls.empty()) {
+    Eigen::VectorXd any = v, end = from + h * v;
+    meet_walls(from, h, x, any);
+    meet_walls(from, h, end, v);
+  }
+  const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
+  report.inverted = std::max(report.inverted, sums.inverted);
+  forces_ += body_.load() + push;
+  add_damping_forces(body_, x, v, state.plastic, forces_);
   const auto kinetic = [&] { return 0.5 * state.v.dot(body_.mass().cwiseProduct(state.v)); };
   const double kinetic_before = kinetic();
-  step_explicitly(options_.scheme.integrator, h, accelerate, state.x, state.v);
-  // A stable step does not create this much energy.
+  for (const Index dof : body_.dof_of_free()) state.v[dof] += h * forces_[dof] / body_.mass()[dof];
+  state.x += h * state.v;
+  // No stable step makes energy of this size by itself.
   const double work =
       (body_.load() + push).cwiseAbs().dot((state.x - from).cwiseAbs() + h * state.v.cwiseAbs());
-  const double most = 4.0 * (kinetic_before + energy_before + work);
+  const double most = 4.0 * (kinetic_before + sums.energy + work);
   if (!(kinetic() <= most + 1e-30)) return false;
   report.contacts = meet_walls(from, h, state.x, state.v);
   return true;

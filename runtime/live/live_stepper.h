@@ -14,37 +14,33 @@ namespace palpate {
 
 struct StepperOptions {
   double time_step = 0.001;  ///< h [s]
-  ImplicitOptions scheme{};  ///< integrator, also an explicit one
+  ImplicitOptions scheme{};  ///< the integrator, the explicit one too
   std::vector<Wall> walls{};
 };
 
 /// Result of a step.
 struct LiveReport {
-  bool whole = true;     ///< false: it diverged in the shortest steps too, and the body was stopped
-  int parts = 1;         ///< parts of a divided step: it diverged, or the body became too stiff
-  int newton = 0;        ///< Newton steps in all parts
-  Index inverted = 0;    ///< largest number of inverted quadrature points during the step
-  Index contacts = 0;    ///< nodes pushed by a wall
-  FlowSums flow{};       ///< plastic flow
-  double limit = 0.0;    ///< explicit: longest stable step at the last check [s]; else infinity
-  bool is_near = false;  ///< explicit: the step exceeds nine tenths of the limit
+  bool whole = true;   ///< else it diverged in the shortest steps too: the body was stopped where it was
+  int parts = 1;       ///< steps that it was cut into as it diverged, or where the body had become too stiff
+  Index inverted = 0;  ///< most quadrature points on its way
+  Index contacts = 0;  ///< nodes that a wall pushes
+  FlowSums flow{};     ///< plastic flow
 };
 
 /// Counts of events during all steps.
 struct LiveCounts {
   std::int64_t steps = 0;
-  std::int64_t halved = 0;      ///< divided steps
-  std::int64_t stopped = 0;     ///< steps that diverged at any length
-  std::int64_t inverted = 0;    ///< steps with inverted elements
-  Index most_inverted = 0;      ///< most inverted quadrature points in a step
-  std::int64_t near_limit = 0;  ///< explicit: steps above nine tenths of the stable one
-  double plastic_work = 0.0;    ///< [J]
+  std::int64_t halved = 0;    ///< steps that were cut
+  std::int64_t stopped = 0;   ///< steps that diverged however short
+  std::int64_t inverted = 0;  ///< steps in which elements were inverted
+  Index most_inverted = 0;    ///< quadrature points in a step
+  double plastic_work = 0.0;  ///< [J]
 
   void add(const LiveReport& report) noexcept;
 };
 
-/// Steps of fixed length. Unstable explicit steps are refused, and checked and divided as the body stiffens;
-/// implicit steps are divided if Newton's method does not converge.
+/// Steps of one length. Explicit ones are refused where they are longer than is stable, and cut while the
+/// body is stiffer than at rest; implicit ones are cut where Newton's method does not get there.
 class LiveStepper {
  public:
   /// Throws Error if the step is not positive, an explicit step is unstable at rest (with the limit), or a
@@ -54,29 +50,21 @@ class LiveStepper {
   /// Performs one step under `push` [d N] in addition to the body's load [N]; empty: none.
   LiveReport step(LiveState& state, const Eigen::VectorXd& push = {});
 
-  [[nodiscard]] const LiveBody& body() const noexcept { return body_; }
-  [[nodiscard]] const StepperOptions& options() const noexcept { return options_; }
   [[nodiscard]] const LiveCounts& counts() const noexcept { return counts_; }
-  /// Longest stable step at rest [s]; infinity for implicit integrators.
-  [[nodiscard]] double limit_at_rest() const noexcept { return limit_at_rest_; }
-  /// Factor of the last implicit step.
+  /// The factor of the last implicit step.
   [[nodiscard]] const TangentSolver& solver() const noexcept { return implicit_.solver(); }
-  [[nodiscard]] const WallContacts& contacts() const noexcept { return implicit_.contacts(); }
 
  private:
   bool advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth, LiveReport& report);
   bool advance_once(LiveState& state, double h, const Eigen::VectorXd& push, LiveReport& report);
   bool advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push, LiveReport& report);
   Index meet_walls(const Eigen::VectorXd& from, double h, Eigen::VectorXd& x, Eigen::VectorXd& v) const;
-  void find_acceleration(LiveState& state, const Eigen::VectorXd& push);
-  void watch_limit(const LiveState& state, LiveReport& report);
 
   const LiveBody& body_;
   StepperOptions options_;
   ImplicitStep implicit_;
   LargestFrequency frequency_;
-  double limit_at_rest_;
-  double limit_;
+  double limit_;  // longest stable step by the last look [s]; implicit: infinity
   LiveCounts counts_;
   Eigen::VectorXd none_;    // [d N]
   Eigen::VectorXd forces_;  // [d N]

@@ -1,6 +1,8 @@
 #include "runtime/live/stability.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "statics/live_forces.h"
@@ -33,10 +35,11 @@ double LargestFrequency::estimate(const Eigen::VectorXd& x, std::span<const Mat3
   return std::sqrt(std::max(square, 0.0));
 }
 
-double longest_step_at(const LiveBody& body, Integrator integrator, double omega) {
+double longest_step_at(const LiveBody& body, double omega) {
   if (!(omega > 0.0)) return std::numeric_limits<double>::infinity();
   const Rayleigh& damping = body.options().damping;
-  return longest_stable_step(integrator, omega, 0.5 * (damping.mass / omega + damping.stiffness * omega));
+  const double zeta = 0.5 * (damping.mass / omega + damping.stiffness * omega);
+  return 2.0 / (omega * (std::sqrt(1.0 + zeta * zeta) + zeta));
 }
 
 }  // namespace palpate

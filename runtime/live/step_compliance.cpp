@@ -11,20 +11,6 @@ namespace {
 
 constexpr Eigen::Index columns_at_once = 64;
 
-/// Displacement of the end of an explicit step, as a fraction of h^2 times the initial acceleration.
-double explicit_share(Integrator integrator) noexcept {
-  switch (integrator) {
-    case Integrator::semi_implicit_euler:
-      return 1.0;
-    case Integrator::rk2:
-    case Integrator::rk4:
-    case Integrator::verlet:
-      return 0.5;
-    default:
-      return 0.0;
-  }
-}
-
 std::vector<Index> free_dofs_of(const LiveBody& body, std::span<const Index> nodes) {
   const int d = body.dimension();
   std::vector<Index> free;
@@ -48,7 +34,7 @@ StepCompliance::StepCompliance(const LiveBody& body, const StepperOptions& stepp
 bool StepCompliance::begin(const Eigen::VectorXd& x, std::span<const Mat3> plastic) {
   const Integrator integrator = stepper_.scheme.integrator;
   const double h = stepper_.time_step;
-  StepFactors factors{.s = 1.0 / (explicit_share(integrator) * h * h)};
+  StepFactors factors{.s = 1.0 / (h * h)};
   if (is_implicit(integrator)) {
     factors = step_factors(integrator, h);
     assemble_tangent(body_, x, plastic, TangentKind::positive, A_);
@@ -102,10 +88,6 @@ void StepCompliance::find_all(int jobs) {
 
 PackedGreens StepCompliance::take() noexcept {
   return {std::exchange(packed_, nullptr), std::ssize(free_), Precision::double_precision};
-}
-
-bool answers_within_step(Integrator integrator) noexcept {
-  return is_implicit(integrator) || explicit_share(integrator) > 0.0;
 }
 
 PackedGreens turned(const PackedGreens& W, const Mat3& Q, int d) {

@@ -10,10 +10,10 @@
 
 namespace palpate {
 
-/// Compliance W [m/N] of one step between all dofs of some nodes: displacement of the end of the step per
-/// force during it. For implicit Euler (M / h^2 + C_d / h + K)^-1 with the tangent at given positions; for an
-/// explicit integrator a multiple of h^2 M^-1, for forces at the beginning of the step. Computed a few
-/// columns at a time, so that the caller can spread the work over several steps.
+/// The compliance W [m/N] of one step between all dofs of some nodes: by how much the step's end moves with
+/// the forces in it. By implicit Euler (M / h^2 + C_d / h + K)^-1 with the tangent at some positions; by
+/// semi-implicit Euler h^2 M^-1. Found some columns at a time, so that whoever steps a body can spread the
+/// work over steps.
 class StepCompliance {
  public:
   /// `body` must outlive this; `nodes`: mesh nodes.
@@ -42,10 +42,7 @@ class StepCompliance {
   Eigen::Index found_ = 0;  // computed columns
 };
 
-/// True if a tool can be felt with the integrator: the end of its step depends on the forces during it.
-bool answers_within_step(Integrator integrator) noexcept;
-
-/// Q W Q^T: compliance of a body rotated by Q, in blocks of d dofs. In double precision.
+/// Q W Q^T: the compliance of a body that has turned by Q, blocks of d dofs each. In double precision.
 PackedGreens turned(const PackedGreens& W, const Mat3& Q, int d);
 
 }  // namespace palpate

@@ -21,7 +21,6 @@ class WallContacts {
   WallContacts(const LiveBody& body, std::vector<Wall> walls, Index most = 200);
 
   [[nodiscard]] bool any_walls() const noexcept { return !walls_.empty(); }
-  [[nodiscard]] const std::vector<Wall>& walls() const noexcept { return walls_; }
   [[nodiscard]] Index count() const noexcept { return static_cast<Index>(contacts_.size()); }
   [[nodiscard]] Index closed() const noexcept;  ///< contacts with a force
 

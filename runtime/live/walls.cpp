@@ -15,12 +15,11 @@ Vec3 shortened(const Vec3& v, double by) noexcept {
 
 }  // namespace
 
-std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension,
-                             bool has_lid) {
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension) {
   std::vector<Wall> walls;
   for (int axis = 0; axis < dimension; ++axis) {
     walls.push_back({.normal = Vec3::Unit(axis), .offset = low[axis], .friction = friction});
-    if (axis < dimension - 1 || has_lid)
+    if (axis < dimension - 1)
       walls.push_back({.normal = -Vec3::Unit(axis), .offset = -high[axis], .friction = friction});
   }
   return walls;

@@ -16,9 +16,8 @@ struct Wall {
   std::optional<std::pair<Vec3, Vec3>> box{};  ///< instead of the plane: lowest and highest corner [m]
 };
 
-/// Returns a floor and walls around a box, open above; with a lid, closed. In the plane y is up, else z.
-std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension = 3,
-                             bool has_lid = false);
+/// A floor and walls around a box, open above. In the plane y is up, else z.
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension = 3);
 
 /// Gap between a node and a wall, along a normal.
 struct WallGap {

@@ -134,15 +134,12 @@ Value read_name(const Setting& setting, const std::string& text, std::initialize
 
 void read_value(const Setting& setting, const std::string& text, LiveLaw& law) {
   law = read_name(setting, text,
-                  {LiveLaw::linear, LiveLaw::corotational, LiveLaw::corotational_qr, LiveLaw::neo_hookean,
-                   LiveLaw::mass_spring});
+                  {LiveLaw::linear, LiveLaw::corotational, LiveLaw::corotational_qr, LiveLaw::neo_hookean});
 }
 
 void read_value(const Setting& setting, const std::string& text, Integrator& integrator) {
-  integrator =
-      read_name(setting, text,
-                {Integrator::implicit_euler, Integrator::midpoint, Integrator::newmark,
-                 Integrator::semi_implicit_euler, Integrator::verlet, Integrator::rk2, Integrator::rk4});
+  integrator = read_name(setting, text,
+                         {Integrator::implicit_euler, Integrator::midpoint, Integrator::semi_implicit_euler});
 }
 
 void read_value(const Setting& setting, const std::string& text, SolverKind& kind) {
@@ -272,7 +269,7 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   const bool is_told = live.solver.has_value();
   visit(
       Setting{
-          "solver", group, "linear|corotational|corotational-qr|neo-hookean|mass-spring", "",
+          "solver", group, "linear|corotational|corotational-qr|neo-hookean", "",
           "none: the file's Green's functions",
           "solve the body anew in each step, beside the tick, for large deformation and bodies that move; "
           "the tool meets the compliance of one step",
@@ -286,11 +283,12 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
                 live_steps, is_told},
         step);
   visit(
-      Setting{"integrator", group, "implicit-euler|midpoint|newmark|semi-implicit-euler|verlet|rk2|rk4", "",
-              "implicit-euler",
-              "how the solver steps; implicit-euler damps fast motion, midpoint and newmark keep energy; the "
-              "others are explicit: steps cost little, and are refused where they are longer than is stable",
-              any_number, is_told},
+      Setting{
+          "integrator", group, "implicit-euler|midpoint|semi-implicit-euler", "", "implicit-euler",
+          "how the solver steps; implicit-euler damps fast motion, midpoint keeps energy; "
+          "semi-implicit-euler is explicit: steps cost little, and are refused where they are longer than "
+          "is stable",
+          any_number, is_told},
       integrator);
   visit(Setting{"step-solver", group, "factor|cg", "", "factor",
                 "how an implicit step is solved: by a factor, or by conjugate gradients, which is faster for "

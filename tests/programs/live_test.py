@@ -69,31 +69,14 @@ class Live(ProgramTest):
         self.assertLess(of_stiffer["live"]["compliance_age_s"], 0.9)
         self.assertGreater(of_stiffer["live"]["compliance_renewals"], 0)
 
-    def test_explicit_integrators_and_conjugate_gradients_press_alike(self):
+    def test_explicit_steps_and_conjugate_gradients_press_alike(self):
         file = self.bake(BLOCK)
         options = ("--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20")
         reference, _ = self.force(file, 0.004, *options, seconds=0.6)
-        for way in (("--step-solver", "cg"), ("--integrator", "semi-implicit-euler"), ("--integrator", "verlet"), ("--integrator", "rk4")):
+        for way in (("--step-solver", "cg"), ("--integrator", "semi-implicit-euler")):
             force, report = self.force(file, 0.004, *options, "--stiffness-damping", "0", *way, seconds=0.6)
             self.assertAlmostEqual(force / reference, 1, delta=0.01, msg=way)
             self.assertEqual(report["live"]["steps_stopped"], 0)
-            explicit = "--integrator" in way
-            self.assertEqual(report["live"]["longest_stable_step_s"] is not None, explicit)
-
-    def test_a_step_near_the_limit_is_told(self):
-        file = self.bake(BLOCK)
-        options = ("--solver", "neo-hookean", "--integrator", "verlet", "--stiffness-damping", "0", "--mass-damping", "20")
-        path = self.write("touch.csv", press(0.001))
-        refused = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", *options, "--live-step", "0.05", cwd=self.folder)
-        limit = float(refused.stderr.split("the longest stable one is ")[1].split()[0])
-        stiffer = (0.95 * limit / 0.001) ** 2  # the limit falls with the root of the stiffness: 1 ms is 95 % of it
-        report, told = self.play(file, press(0.001), *options, "--live-step", "0.001", "--stiffness-scale", str(stiffer))
-        self.assertGreater(report["live"]["steps_near_limit"], 0)
-        self.assertGreater(report["status_ticks"]["near_step_limit"], 0)
-        self.assertIn("the body stiffened", told)
-        far, told = self.play(file, press(0.001), *options, "--live-step", "0.001")
-        self.assertEqual(far["status_ticks"]["near_step_limit"], 0)
-        self.assertNotIn("the body stiffened", told)
 
     def test_equal_runs_are_equal_and_replay_to_the_bit(self):
         file = self.bake(BLOCK)
@@ -143,7 +126,7 @@ class Live(ProgramTest):
     def test_a_free_body_falls_as_gravity_says(self):
         file = self.bake(BLOCK)
         away = "t,x,y,z\n0,0.02,0.02,0.5\n1,0.02,0.02,0.5\n"
-        for integrator, late in (("implicit-euler", 0.005), ("midpoint", 0.0), ("newmark", 0.0)):
+        for integrator, late in (("implicit-euler", 0.005), ("midpoint", 0.0)):
             self.play(file, away, "--record", "fall.mcap", "--solver", "corotational", "--free", "yes", "--gravity", "0,0,-9.81", "--integrator", integrator)
             frames = palpate.read(self.folder / "fall.mcap").frames
             u, time = frames["displacement"][:][..., 2].mean(axis=1), frames["time"][:]
@@ -160,7 +143,7 @@ class Live(ProgramTest):
         with h5py.File(self.folder / file) as stored:
             self.assertNotIn("greens", stored)
             self.assertEqual(stored["dofs/stored_nodes"].shape, (0,))
-        for solver in ("corotational", "neo-hookean", "mass-spring"):
+        for solver in ("corotational", "neo-hookean"):
             bare, other = (self.force(body, 0.003, "--solver", solver, seconds=0.2)[0] for body in (file, whole))
             self.assertGreater(bare, 0)
             self.assertEqual(bare, other, solver)
@@ -232,7 +215,8 @@ class Live(ProgramTest):
                                  (("--solver", "linear", "--gravity", "0,0,-1e6"), "at most 1000"),
                                  (("--solver", "linear", "--live-step", "1"), "at most 0.1"),
                                  (("--solver", "linear", "--integrator", "explicit-euler"), "none of implicit-euler"),
-                                 (("--solver", "linear", "--integrator", "verlet", "--live-step", "0.05"), "the longest stable one is"),
+                                 (("--solver", "linear", "--integrator", "semi-implicit-euler", "--live-step", "0.05"), "the longest stable one is"),
+                                 (("--solver", "mass-spring"), "none of linear, corotational"),
                                  (("--solver", "linear", "--creep", "-1"), "not a number that is"),
                                  (("--solver", "linear", "--poissons-ratio", "0.5"), "between -1 and 1/2"),
                                  (("--poissons-ratio", "0.4"), "--solver, which is not given"),

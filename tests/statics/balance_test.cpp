@@ -9,6 +9,7 @@
 #include "meshes/element.h"
 #include "runtime/live/plastic_flow.h"
 #include "tests/support/live_bodies.h"
+#include "tests/support/springs.h"
 
 namespace palpate::balance_test {
 namespace {
@@ -234,52 +235,65 @@ TEST(Flow, AClosedCycleTakesWork) {
   EXPECT_NEAR(of_cycle / (by_rule + stored), 1.0, 1e-6);
 }
 
-/// E and nu that a pulled bar shows.
-Eigen::Vector2d measured_constants(LiveInput input, LiveLaw law) {
-  const LiveBody body(std::move(input), {.law = law});
+/// A cube of tet4 between planes of symmetry, both its ends along x held.
+LiveInput held_cube(double nu) {
+  LiveInput input = test::live_input_of(generate(BoxShape{Vec3::Zero(), Vec3::Constant(0.03), {6, 6, 6}}),
+                                        {.youngs_modulus = 5e3, .poissons_ratio = nu});
+  test::hold(
+      input, [](const Vec3& x) { return x.x() < 1e-9 || x.x() > 0.03 - 1e-9; }, 1);
+  test::hold(
+      input, [](const Vec3& x) { return x.y() < 1e-9; }, 2);
+  test::hold(
+      input, [](const Vec3& x) { return x.z() < 1e-9; }, 4);
+  return input;
+}
+
+constexpr double strain = 1e-6;  // by which the cube is pulled
+
+VectorXd pulled_cube(const LiveBody& body) {
   VectorXd x = body.start();
-  const double e = 1e-6, size = 0.03;
   for (Eigen::Index k = 0; k < x.size(); k += 3) {
-    if (body.rest()[k] > size - 1e-9) x[k] += e * size;
+    if (body.rest()[k] > 0.03 - 1e-9) x[k] += strain * 0.03;
   }
-  EXPECT_TRUE(find_balance(body, VectorXd::Zero(x.size()), {}, x, {.tolerance = 1e-8}).converged);
-  VectorXd f;
-  internal_forces(body, x, {}, f);
+  return x;
+}
+
+/// E and nu that the pulled cube shows, at x with the forces f on its nodes.
+Eigen::Vector2d shown_constants(const LiveBody& body, const VectorXd& x, const VectorXd& f) {
   double force = 0.0, across = 0.0;
   int nodes = 0;
   for (Eigen::Index k = 0; k < x.size(); k += 3) {
-    if (body.rest()[k] > size - 1e-9) force -= f[k];
-    if (body.rest()[k + 1] < size - 1e-9) continue;
-    across += (x[k + 1] - body.rest()[k + 1]) / size;
+    if (body.rest()[k] > 0.03 - 1e-9) force -= f[k];
+    if (body.rest()[k + 1] < 0.03 - 1e-9) continue;
+    across += (x[k + 1] - body.rest()[k + 1]) / 0.03;
     ++nodes;
   }
-  return {force / (size * size) / e, -across / nodes / e};
+  return {force / (0.03 * 0.03) / strain, -across / nodes / strain};
 }
 
 TEST(Springs, HaveAboutYoungsModulusAndAPoissonsRatioOfTheirOwn) {
   for (const double nu : {0.0, 0.45}) {
-    LiveInput input = test::live_input_of(generate(BoxShape{Vec3::Zero(), Vec3::Constant(0.03), {6, 6, 6}}),
-                                          {.youngs_modulus = 5e3, .poissons_ratio = nu});
-    test::hold(
-        input, [](const Vec3& x) { return x.x() < 1e-9 || x.x() > 0.03 - 1e-9; }, 1);
-    test::hold(
-        input, [](const Vec3& x) { return x.y() < 1e-9; }, 2);
-    test::hold(
-        input, [](const Vec3& x) { return x.z() < 1e-9; }, 4);
-    const Eigen::Vector2d springs = measured_constants(input, LiveLaw::mass_spring),
-                          elements = measured_constants(input, LiveLaw::corotational);
+    const LiveBody body(held_cube(nu), {.law = LiveLaw::corotational});
+    const VectorXd none = VectorXd::Zero(body.dofs());
+    VectorXd by_elements = pulled_cube(body), by_springs = by_elements, f;
+    EXPECT_TRUE(find_balance(body, none, {}, by_elements, {.tolerance = 1e-8}).converged);
+    internal_forces(body, by_elements, {}, f);
+    const Eigen::Vector2d elements = shown_constants(body, by_elements, f);
     EXPECT_NEAR(elements[0], 5e3, 0.1);
     EXPECT_NEAR(elements[1], nu, 1e-5);
-    EXPECT_NEAR(springs[0] / 5e3, 1.0, 0.25);  // Kuhn's mesh is not the same in all directions
-    EXPECT_NEAR(springs[1], 0.25, 0.2);
+    const std::vector<test::Spring> springs = test::fitted_springs(body.mesh(), 5e3);
+    EXPECT_LT(find_balance(springs, body, none, by_springs), 1e-8);
+    const Eigen::Vector2d network = shown_constants(body, by_springs, test::forces_of(springs, by_springs).f);
+    EXPECT_NEAR(network[0] / 5e3, 1.0, 0.25);  // Kuhn's mesh is not the same in all directions
+    EXPECT_NEAR(network[1], 0.25, 0.2);
   }
 }
 
 // The sum over all directions is what the fit rests on: 6 E V.
 TEST(Springs, TheirSumIsThatOfAnEvenNetwork) {
-  const LiveBody body(test::live_block(ElementType::tet4), {.law = LiveLaw::mass_spring});
   double sum = 0.0;
-  for (const Spring& spring : body.springs()) sum += spring.stiffness * spring.length * spring.length;
+  for (const test::Spring& spring : test::fitted_springs(test::live_block(ElementType::tet4).mesh, 5e3))
+    sum += spring.stiffness * spring.length * spring.length;
   EXPECT_NEAR(sum / (6.0 * 5e3 * length * width * width), 1.0, 1e-12);
 }
 

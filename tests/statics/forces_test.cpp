@@ -23,12 +23,10 @@ struct Kind {
 
 std::vector<Kind> all_kinds() {
   std::vector<Kind> kinds;
-  for (const LiveLaw law :
-       {LiveLaw::linear, LiveLaw::corotational, LiveLaw::neo_hookean, LiveLaw::mass_spring}) {
+  for (const LiveLaw law : {LiveLaw::linear, LiveLaw::corotational, LiveLaw::neo_hookean}) {
     kinds.push_back({ElementType::tet4, law});
     kinds.push_back({ElementType::tri3, law, Analysis::plane_strain});
     kinds.push_back({ElementType::tri3, law, Analysis::plane_stress});
-    if (law == LiveLaw::mass_spring) continue;
     for (const ElementType element : {ElementType::tet10, ElementType::hex8}) kinds.push_back({element, law});
     kinds.push_back({ElementType::quad4, law, Analysis::plane_strain});
   }
@@ -204,7 +202,6 @@ MatrixXd linear_stiffness(const LiveInput& input) {
 
 TEST(LiveForces, AllLawsAreHookesAtSmallStrain) {
   for (const Kind& kind : all_kinds()) {
-    if (kind.law == LiveLaw::mass_spring) continue;
     const LiveInput input = test::live_block(kind.element, kind.analysis);
     const MatrixXd K = linear_stiffness(input);
     const LiveBody body(input, {.law = kind.law});
@@ -254,7 +251,6 @@ TEST(LiveForces, SillyOptionsAreRefused) {
                Error);
   EXPECT_THROW(LiveBody(block, {.damping = {.mass = -1.0}}), Error);
   EXPECT_THROW(LiveBody(block, {.gravity = Vec3(0, 0, std::nan(""))}), Error);
-  EXPECT_THROW(LiveBody(test::live_block(ElementType::tet10), {.law = LiveLaw::mass_spring}), Error);
 }
 
 }  // namespace

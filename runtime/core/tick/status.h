@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Limitations of a tick; no bit is set if there are none. Bit 5 is unused. The book's reference shows these
-/// comments.
+/// What a tick could not do; no bit is set when all is well. Bits 5 and 14 are free. The
+/// reference shows these comments.
 enum class StepStatus : std::uint32_t {
   ok = 0,
   nothing_in_reach = 1U << 0,   ///< grab is pressed, the tool touches nothing and no surface is within reach
@@ -23,8 +23,7 @@ enum class StepStatus : std::uint32_t {
   handing_over = 1U << 10,      ///< the force approaches that of the contact gradually, to avoid a kick
   older_patch = 1U << 11,       ///< the overlay for this place was not ready: an older one was used, or none
   late_motion = 1U << 12,    ///< the free motion of the body was not ready in time: the surface waits for it
-  rigid_contact = 1U << 13,  ///< the tool presses on a rigid part: only its coupling deforms
-  near_step_limit = 1U << 14,  ///< a live body's explicit time step is close to the stability limit
+  rigid_contact = 1U << 13,  ///< the tool presses on what cannot move: only its coupling gives way
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
@@ -38,7 +37,7 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 14> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
     {StepStatus::unsettled, "unsettled"},
@@ -52,7 +51,6 @@ inline constexpr std::array<std::pair<StepStatus, const char*>, 14> status_names
     {StepStatus::older_patch, "older_patch"},
     {StepStatus::late_motion, "late_motion"},
     {StepStatus::rigid_contact, "rigid_contact"},
-    {StepStatus::near_step_limit, "near_step_limit"},
 }};
 
 }  // namespace palpate

@@ -160,7 +160,6 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
   if (!surface.motion.active()) return;
   const bool is_behind = surface.motion.job().step > surface.motion.sample_step() + 1;  // by whole steps
   if (is_behind || surface.motion.is_late()) state.status |= StepStatus::late_motion;
-  if (surface.motion.is_near_limit()) state.status |= StepStatus::near_step_limit;
   move_near_surface(body, surface);
   const auto d = static_cast<std::size_t>(body.dimension());
   for (const ToolState& tool : state.tools) {

@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// Moves the surface by the body's free motion in this tick: all near nodes, and as many around the tools as
-/// may have come near since the last update. Sets StepStatus::late_motion and near_step_limit.
+/// Moves the surface to where the body's free motion has it in this tick: all near nodes, and as many around
+/// the tools as may have come near since they were looked at. Sets StepStatus::late_motion.
 void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch& detection) noexcept;
 
 /// Switches the compliance for contact forces, null for the body's Green's functions, without moving the

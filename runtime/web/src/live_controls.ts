@@ -1,9 +1,6 @@
 // The settings of a body that is solved while it is touched: shown for such bodies alone.
 import { input, part, select, show_value } from './dom';
-import type { Frame } from './wire';
 import type { State } from './words';
-
-const near_limit_bit = 1 << 14; // StepStatus::near_step_limit
 
 // Its boxes, by the setting's name, with what holds where nothing is set.
 const numbers: Record<string, string> = {
@@ -43,10 +40,4 @@ export class LiveControls {
     for (const [name, otherwise] of Object.entries(numbers)) show_value(input(name), settings[name] ?? otherwise);
     for (const [name, otherwise] of Object.entries(choices)) show_value(select(name), settings[name] ?? otherwise);
   }
-}
-
-/** What is said of an explicit step that is close to the longest stable one; empty: nothing. */
-export function near_limit(frame: Frame | null): string {
-  if (!frame || (frame.status & near_limit_bit) === 0) return '';
-  return 'Explicit step near the longest stable one: take a shorter step or an implicit integrator';
 }

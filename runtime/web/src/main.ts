@@ -9,7 +9,6 @@ import { format_si, format_time, short_number } from './format';
 import { History } from './history';
 import { as_hash, keep, keep_theme, kept_of, kept_theme, of_hash, type Kept } from './kept';
 import { on_keys } from './keyboard';
-import { near_limit } from './live_controls';
 import { show_light, turned_beside } from './range_light';
 import { LiveSource, socket_url } from './live_source';
 import { Gallery, show_way_back } from './gallery';
@@ -551,9 +550,6 @@ class Page implements Listener {
     show_felt(this.felt());
     const bound = this.picture_.frame?.greens_error ?? 0;
     write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
-    const near = near_limit(this.picture_.frame);
-    write(part('near-limit'), near);
-    part('near-limit').hidden = near === '';
     const text = this.best_effort();
     write(part('best-effort'), text);
     part('best-effort').hidden = text === '';

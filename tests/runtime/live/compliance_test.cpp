@@ -11,6 +11,7 @@
 #include "runtime/core/tick/step.h"
 #include "runtime/core/tick/surface_motion.h"
 #include "tests/support/live_session.h"
+#include "tests/support/thrown_bodies.h"
 
 namespace palpate::live_compliance_test {
 namespace {
@@ -140,7 +141,7 @@ TEST_P(LiveComplianceOf, ABodyThatTurnedIsRightAgain) {
   const double at_rest = error_of(body.greens(), body, state);
   EXPECT_LT(at_rest, 1e-5);
   const Mat3 R = Eigen::AngleAxisd(quarter, Vec3::UnitZ()).toRotationMatrix();
-  throw_body(body.live()->body, R, Vec3(0.1, 0, 0), Vec3::Zero(), Vec3::Zero(), state);
+  test::throw_body(body.live()->body, R, Vec3(0.1, 0, 0), Vec3::Zero(), Vec3::Zero(), state);
   EXPECT_GT(error_of(body.greens(), body, state), 0.1);
   LiveCompliance compliance(body, true);
   for (int k = 0; k < 200 && compliance.renewals() == 0; ++k) compliance.follow(state, 0.0);
@@ -155,8 +156,8 @@ TEST_P(LiveComplianceOf, ABodyThatGoesOnTurningIsTakenWithIt) {
   const Vec3 axis = GetParam() == 2 ? Vec3(0, 0, 1) : Vec3(Vec3(1, 2, 2) / 3.0);
   for (int k = 0; k < 300; ++k) {
     LiveState now(body.live()->body);
-    throw_body(body.live()->body, Eigen::AngleAxisd(0.02 * k, axis).toRotationMatrix(), Vec3::Zero(),
-               Vec3::Zero(), Vec3::Zero(), now);
+    test::throw_body(body.live()->body, Eigen::AngleAxisd(0.02 * k, axis).toRotationMatrix(), Vec3::Zero(),
+                     Vec3::Zero(), Vec3::Zero(), now);
     now.time = 0.005 * k;
     compliance.follow(now, 0.0);
     old.follow(now, 0.0);

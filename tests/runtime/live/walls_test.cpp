@@ -13,9 +13,13 @@
 #include "base/error.h"
 #include "runtime/live/live_stepper.h"
 #include "tests/support/live_bodies.h"
+#include "tests/support/thrown_bodies.h"
 
 namespace palpate::walls_test {
 namespace {
+
+using test::momenta_of;
+using test::throw_body;
 
 constexpr double g = 9.81;
 
@@ -101,7 +105,6 @@ TEST(Walls, ABlockRestsBelowTheFrictionAngle) {
   }
   EXPECT_LT(creep(coarse, 1e6, Integrator::implicit_euler, 5e-3, 20.0), still);
   EXPECT_LT(creep(coarse, 5e4, Integrator::midpoint, 5e-3, 22.0), still);
-  EXPECT_LT(creep(coarse, 5e4, Integrator::newmark, 5e-3, 22.0), still);
   EXPECT_LT(creep(fine, 5e4, Integrator::implicit_euler, 1e-2, 20.0), still);
 }
 
@@ -109,11 +112,7 @@ TEST(Walls, ABlockRestsBelowTheFrictionAngle) {
 TEST(Walls, ABlockRestsInExplicitStepsNearTheirLimitToo) {
   constexpr double still = 1e-5;  // [m/s]
   constexpr std::array<int, 3> cells = {4, 4, 3};
-  EXPECT_LT(creep(cells, 5e4, Integrator::verlet, 1e-3, 22.0), still);
-  EXPECT_LT(creep(cells, 5e4, Integrator::verlet, 1.25e-3, 22.0), still);
-  EXPECT_LT(creep(cells, 5e4, Integrator::rk2, 1e-3, 22.0), still);
-  EXPECT_LT(creep(cells, 5e4, Integrator::rk2, 1.25e-3, 22.0), still);
-  EXPECT_LT(creep(cells, 5e4, Integrator::rk4, 1.5625e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::semi_implicit_euler, 2.5e-4, 22.0), still);
   EXPECT_LT(creep(cells, 5e4, Integrator::semi_implicit_euler, 5e-4, 22.0), still);
 }
 
@@ -146,8 +145,7 @@ double lowest(const LiveState& state, int d) {
 TEST(Walls, NothingBouncesHigherThanItFell) {
   const LiveBody body(stone(ElementType::tet4), {.law = LiveLaw::corotational, .gravity = Vec3(0, 0, -g)});
   for (const Integrator integrator :
-       {Integrator::semi_implicit_euler, Integrator::verlet, Integrator::rk4, Integrator::implicit_euler,
-        Integrator::midpoint, Integrator::newmark}) {
+       {Integrator::semi_implicit_euler, Integrator::implicit_euler, Integrator::midpoint}) {
     const double h = is_implicit(integrator) ? 1e-3 : 1e-4;
     LiveStepper stepper(body, {.time_step = h,
                                .scheme = {.integrator = integrator},
