@@ -47,7 +47,7 @@ enum class TangentKind : std::uint8_t {
 
 /// Energy and stress at F, in the plane with F_33 = 1. `relaxed` [3 x 3] is the strain, in the rotated frame,
 /// at which there is no stress: initial and plastic; of linear and corotational laws. Finite for every finite
-/// F: the neo-Hookean law goes on smoothly where the volume is below a tenth of what it was. Of the
+/// F: the neo-Hookean law goes on smoothly where the volume is below a tenth of the original. Of the
 /// corotational law P is the exact derivative of the energy, also where relaxed strain is turned against the
 /// stretch: then it has a part beside R sigma that keeps moments in balance.
 PointStress stress_at(LiveLaw law, const LawConstants& constants, const Mat3& F,

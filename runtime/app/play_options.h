@@ -42,11 +42,11 @@ struct PlayOptions {
   std::optional<double> duration;  ///< [s]; default: to the end of script or session, or until interrupted
   std::optional<int> processor;    ///< processor reserved for the loop
   bool fast = false;
-  std::optional<ViewerOptions> view;  ///< where it is shown in a browser
-  std::filesystem::path beside;       ///< recording that the browser shows beside it; empty: none
-  std::filesystem::path record;       ///< empty: nothing is recorded
-  double record_frames = 60.0;        ///< of the surface a second; 0: none
-  std::filesystem::path report;       ///< JSON; "-": on the standard output; empty: none
+  std::optional<ViewerOptions> view;  ///< viewer in a browser
+  std::filesystem::path beside;       ///< recording that the viewer shows beside it; empty: none
+  std::filesystem::path record;       ///< empty: no recording
+  double record_frames = 60.0;        ///< surface pictures per second; 0: none
+  std::filesystem::path report;       ///< JSON; "-": to the standard output; empty: none
   std::filesystem::path surface;      ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;     ///< CSV of the contact points after the last tick; empty: none
   bool force = false;                 ///< outputs may replace any file that is not an input

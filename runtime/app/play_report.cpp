@@ -242,7 +242,7 @@ Json json_dynamics(const Body& body, const MotionSource* motion) {
   return json;
 }
 
-/// How often each class of durations came: [upper end in ns, count], each twice as long as the one before.
+/// Counts of durations by class: [upper end in ns, count], each class twice as long as the one before.
 Json json_histogram(const TimeHistogram& histogram) {
   Json json = Json::array();
   std::int64_t from = 0;
@@ -267,7 +267,7 @@ Json json_safety(const LoopReport& report) {
   return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
 }
 
-/// Against the mesh, after the last tick.
+/// Change of the surface relative to the mesh, after the last tick.
 SurfaceChange last_change(const PlayedRun& run) {
   const Body& body = run.body;
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));

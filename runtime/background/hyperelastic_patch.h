@@ -37,8 +37,8 @@ class HyperelasticPatch {
   /// include, or a node of the patch is not stored.
   HyperelasticPatch(const Body& body, PatchMesh mesh);
 
-  /// Goes from where it is towards the balance under forces [N] on surface nodes (Body::simplices); one node
-  /// may come several times.
+  /// Moves from the present state towards the balance under forces [N] on surface nodes (Body::simplices); a
+  /// node may occur several times.
   PatchBalance find(std::span<const Index> surface_nodes, std::span<const Vec3> forces,
                     const PatchEffort& effort = {});
   /// Returns the patch from the tangent at the state where `find` ended. Under the forces given there, it

@@ -25,7 +25,7 @@ struct LiveTelling {
   /// the last step.
   double largest_force_error = 0.0;
   double last_force_error = 0.0;
-  double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
+  double largest_force = 0.0;  ///< largest sum of the forces on the body at the end of a step [N]
 };
 
 /// Measures the computing time of a live model's step beside the tick, by a trial under a small force [s].

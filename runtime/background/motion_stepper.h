@@ -22,7 +22,7 @@ class MotionStepper {
   /// Performs a job, including its release if `lets_go`; writes the displacement u [n] of the stored dofs at
   /// the end of the next step without contact forces [m].
   virtual void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept = 0;
-  /// Fills `u` as MotionSample::untouched.
+  /// Writes MotionSample::untouched to `u`.
   virtual void tell_untouched(std::vector<double>& u) const noexcept { u.clear(); }
   /// Compliance for contact forces, whose effect is added to u; null: the body's Green's functions.
   [[nodiscard]] virtual std::shared_ptr<const Greens> compliance() const noexcept { return nullptr; }

@@ -27,22 +27,22 @@ struct SurfaceFramesOptions {
 
 /// The tool at one moment.
 struct SeenTool {
-  ToolPose device{};  ///< where the hand wants the tool
-  ToolPose tool{};    ///< where it is
-  Wrench on_body{};   ///< the opposite of what the hand feels
+  ToolPose device{};  ///< pose requested by the hand
+  ToolPose tool{};    ///< actual pose
+  Wrench on_body{};   ///< wrench on the body, opposite to that on the hand
   StepStatus status = StepStatus::ok;
-  double force_error = 0.0;   ///< how far the force may be off, where it is a best effort [N]
-  Index left_out = 0;         ///< contact points that found no room
+  double force_error = 0.0;   ///< possible error of the force if it is a best effort [N]
+  Index left_out = 0;         ///< contact points beyond the capacity
   double greens_error = 0.0;  ///< ToolState::greens_error [N]
 };
 
-/// What is seen at one moment.
+/// Picture of one moment.
 struct SurfacePicture : SeenTool {
   SurfaceFrame frame;
-  ContactLoads loads;                  ///< SurfaceFramesOptions::contacts_only
-  std::vector<SeenContact> contacts;   ///< those that are closed
-  std::shared_ptr<const Patch> patch;  ///< null: no overlay
-  /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
+  ContactLoads loads;                  ///< with SurfaceFramesOptions::contacts_only
+  std::vector<SeenContact> contacts;   ///< closed contacts
+  std::shared_ptr<const Patch> patch;  ///< null if there is no overlay
+  /// In the plane with all free nodes stored: values of all mesh nodes, without an overlay's refinement; else
   /// empty.
   std::vector<float> plane_displacement;  ///< [N x 3] displacement relative to the mesh [m]
   std::vector<float> plane_von_mises;     ///< [N] [Pa]

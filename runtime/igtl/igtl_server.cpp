@@ -22,8 +22,8 @@ constexpr auto tick_period = std::chrono::milliseconds(20);
 constexpr int pace_ticks = 250;                // 5 s
 constexpr std::size_t least_in_them = 80'000;  // [bytes]
 constexpr auto farewell = std::chrono::milliseconds(500);
-constexpr int send_room = 256 << 10;              // what waits in it is seen late [bytes]
-constexpr std::size_t most_at_once = 64U << 10U;  // handed to the system before that is counted [bytes]
+constexpr int send_room = 256 << 10;              // data waiting in it arrives late [bytes]
+constexpr std::size_t most_at_once = 64U << 10U;  // passed to the system before progress is measured [bytes]
 
 }  // namespace
 
@@ -31,9 +31,9 @@ constexpr std::size_t most_at_once = 64U << 10U;  // handed to the system before
 /// the client says is read and thrown away.
 class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
  public:
-  /// `server` must live as long.
+  /// `server` must outlive this.
   IgtlClient(tcp::socket socket, IgtlServer& server) : socket_(std::move(socket)), server_(server) {
-    error_code ignored;  // it does without
+    error_code ignored;  // not essential
     address_ = socket_.remote_endpoint(ignored).address();
     socket_.set_option(tcp::no_delay(true), ignored);
     socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
@@ -73,10 +73,10 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
     paced_ = handed_;
   }
 
-  /// It has closed the connection, or took less than 16 kB/s in five seconds in which there was more for it.
+  /// True if it has closed the connection, or received less than 16 kB/s for five seconds with data pending.
   [[nodiscard]] bool is_lost() const noexcept { return is_lost_; }
   [[nodiscard]] const asio::ip::address& address() const noexcept { return address_; }
-  /// It has been sent all there is.
+  /// True if it has been sent all content.
   [[nodiscard]] bool is_served() const { return !is_sending_ && pictures_ == server_.pictures(); }
   void cut() {
     is_lost_ = true;
@@ -111,7 +111,7 @@ IgtlServer::~IgtlServer() = default;
 
 void IgtlServer::accept() {
   acceptor_.async_accept([this](const error_code& problem, tcp::socket socket) {
-    accept_failed_ = problem.failed();  // no file is left for a connection: at the next tick there may be
+    accept_failed_ = problem.failed();  // out of file descriptors: retry at the next tick
     if (problem) return;
     clients_.push_back(std::make_shared<IgtlClient>(std::move(socket), *this));
     clients_.back()->read();
@@ -137,8 +137,8 @@ void IgtlServer::tick() {
   });
 }
 
-/// Cuts the newest client before the last of the address that has most, so that nobody keeps the others out,
-/// and who has watched long stays.
+/// Cuts the newest client before the last of the address that has most, so that no address keeps the others
+/// out, and clients that have watched long stay.
 void IgtlServer::make_room() {
   const auto newest_first = std::views::reverse(clients_);
   const auto most =

@@ -37,7 +37,7 @@ class IgtlServer {
   /// Stops the context once all clients have taken the last picture, after half a second at the latest.
   void finish();
 
-  /// How many were shown.
+  /// Number of pictures shown.
   [[nodiscard]] std::int64_t pictures() const noexcept { return pictures_; }
   /// The last one as messages, which are made when the first client wants them.
   [[nodiscard]] const std::shared_ptr<const std::string>& message();

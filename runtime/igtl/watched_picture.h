@@ -19,8 +19,8 @@ struct WatchedPicture {
   std::size_t corners = 3;                  ///< of a cell: 3 of triangles, 2 of lines
   std::vector<std::uint32_t> cells;         ///< [cells x corners] nodes
   std::vector<float> displacement;          ///< [n] its size [m]
-  std::vector<float> von_mises;             ///< [n] not a number where it is not known [Pa]
-  std::vector<float> pressure;              ///< [n] of the contact [Pa]
+  std::vector<float> von_mises;             ///< [n] NaN where unknown [Pa]
+  std::vector<float> pressure;              ///< [n] contact pressure [Pa]
 };
 
 /// Puts pictures together.

@@ -24,12 +24,12 @@ ImplicitStep::ImplicitStep(const LiveBody& body, const ImplicitOptions& options,
       damping_(A_) {}
 
 StepFactors step_factors(Integrator integrator, double h) {
-  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the middle
+  const bool half = integrator == Integrator::midpoint;  // implicit Euler to the midpoint
   const double t = 1.0 / (half ? 0.5 * h : h);
   return {.s = t * t, .t = t, .ahead = half ? 2.0 : 1.0};
 }
 
-/// Fills the forces that are left on free dofs; the potential whose slope they are [J].
+/// Computes the residual forces on free dofs and returns the potential of which they are the gradient [J].
 double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, const Eigen::VectorXd& push,
                           const StepFactors& step) {
   const Eigen::VectorXd& M = body_.mass();
@@ -63,7 +63,7 @@ double ImplicitStep::look(const Eigen::VectorXd& x, const LiveState& state, cons
   return potential;
 }
 
-/// A = s M + t C_d + K. False when it is not positive definite.
+/// Sets A = s M + t C_d + K. False if it is not positive definite.
 bool ImplicitStep::set_matrix(const Eigen::VectorXd& x, const LiveState& state, const StepFactors& step,
                               TangentKind kind) {
   assemble_tangent(body_, x, state.plastic, kind, K_);
@@ -150,7 +150,8 @@ ImplicitReport ImplicitStep::advance(LiveState& state, double h, const Eigen::Ve
   for (int newton = 0; newton < options_.most_newton; ++newton) {
     if (!newton_step(x, state, push, step, potential) || share_left() <= options_.tolerance) break;
   }
-  // Rounding can hide progress from the line search: what is left then decides. One linear step is as it is.
+  // Rounding can hide progress from the line search; then the residual decides. A single linear step is
+  // accepted as it is.
   const bool converged =
       share_left() <= 100.0 * options_.tolerance || (options_.most_newton == 1 && x.allFinite());
   finish(x, step, state);

@@ -19,10 +19,10 @@ struct ImplicitOptions {
 
 struct ImplicitReport {
   bool converged = false;
-  Index inverted = 0;  ///< most quadrature points on the way
+  Index inverted = 0;  ///< largest number of inverted quadrature points during the step
 };
 
-/// What an implicit integrator makes of a step: at the positions x that it solves for, velocity is t (x - x0)
+/// Step of an implicit integrator: at the positions x that it solves for, velocity is t (x - x0)
 /// and acceleration s (x - x0) - t v0.
 struct StepFactors {
   double s = 0.0;      ///< [1/s^2]

@@ -9,7 +9,7 @@ namespace palpate {
 
 enum class Integrator : std::uint8_t {
   semi_implicit_euler,  ///< explicit: velocity first, then position by the new velocity
-  implicit_euler,       ///< damps what moves faster than its step
+  implicit_euler,       ///< damps motion faster than its step
   midpoint,             ///< implicit; keeps energy, momentum and angular momentum
 };
 

@@ -23,22 +23,22 @@ struct AxisBox {
 
 /// Live solver of a session. By default a body has its precomputed supports and no weight.
 struct LiveSettings {
-  std::optional<LiveLaw> solver;           ///< none: Green's functions
-  std::optional<double> poissons_ratio{};  ///< of all materials; none: the file's
-  double step = 0.005;                     ///< of the solver; a whole number of ticks [s]
+  std::optional<LiveLaw> solver;           ///< empty: Green's functions
+  std::optional<double> poissons_ratio{};  ///< for all materials; empty: from the file
+  double step = 0.005;                     ///< solver time step, a whole number of ticks [s]
   Integrator integrator = Integrator::implicit_euler;
-  SolverKind step_solver = SolverKind::factor;                    ///< of the equations of an implicit step
-  Vec3 gravity = Vec3::Zero();                                    ///< [m/s^2]
-  double mass_damping = 0.0;                                      ///< [1/s]
-  double stiffness_damping = 0.001;                               ///< [s]
-  double yield = std::numeric_limits<double>::infinity();         ///< as in Plasticity
-  double creep = 10.0;                                            ///< as in Plasticity [1/s]
-  double most_plastic = std::numeric_limits<double>::infinity();  ///< as in Plasticity
-  bool free = false;                                              ///< nothing is held
-  std::optional<double> floor{};      ///< height along z, in the plane y; none: there is none [m]
-  std::optional<AxisBox> room{};      ///< the body stays in it: walls and a floor, no lid
-  std::optional<AxisBox> obstacle{};  ///< the body stays out of it
-  double wall_friction = 0.5;         ///< Coulomb's coefficient of all walls
+  SolverKind step_solver = SolverKind::factor;             ///< solver for the equations of an implicit step
+  Vec3 gravity = Vec3::Zero();                             ///< [m/s^2]
+  double mass_damping = 0.0;                               ///< [1/s]
+  double stiffness_damping = 0.001;                        ///< [s]
+  double yield = std::numeric_limits<double>::infinity();  ///< see Plasticity
+  double creep = 10.0;                                     ///< see Plasticity [1/s]
+  double most_plastic = std::numeric_limits<double>::infinity();  ///< see Plasticity
+  bool free = false;                                              ///< remove all supports
+  std::optional<double> floor{};      ///< height along z, in the plane y; empty: no floor [m]
+  std::optional<AxisBox> room{};      ///< box that contains the body: walls and a floor, no lid
+  std::optional<AxisBox> obstacle{};  ///< box that the body stays out of
+  double wall_friction = 0.5;         ///< Coulomb coefficient of all walls
 
   bool operator==(const LiveSettings&) const = default;
 };

@@ -15,7 +15,7 @@ struct LiveState {
 
   Eigen::VectorXd x;          ///< [d N] positions [m]
   Eigen::VectorXd v;          ///< [d N] velocities [m/s]
-  std::vector<Mat3> plastic;  ///< [quadrature points] plastic strain; empty of a body that does not flow
+  std::vector<Mat3> plastic;  ///< [quadrature points] plastic strain; empty without plasticity
   double time = 0.0;          ///< [s]
 };
 

@@ -11,10 +11,10 @@
 namespace palpate {
 namespace {
 
-constexpr int most_depth = 8;          // of halving
-constexpr int rounds_at_rest = 300;    // of the power iteration
-constexpr int rounds_between = 4;      // at each look
-constexpr std::int64_t look_each = 4;  // steps
+constexpr int most_depth = 8;          // nested halvings
+constexpr int rounds_at_rest = 300;    // iterations of the power method
+constexpr int rounds_between = 4;      // iterations per check
+constexpr std::int64_t look_each = 4;  // steps between checks
 
 double limit_at(const LiveBody& body, const StepperOptions& options, LargestFrequency& frequency) {
   if (is_implicit(options.scheme.integrator)) return std::numeric_limits<double>::infinity();
@@ -67,7 +67,8 @@ LiveReport LiveStepper::step(LiveState& state, const Eigen::VectorXd& push) {
   return report;
 }
 
-/// One step of h, or two halves of it. False when the shortest ones diverge too: the body then stands still.
+/// Performs one step of h, or two halves of it. False if the shortest ones diverge too: the body is then
+/// stopped.
 bool LiveStepper::advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth,
                           LiveReport& report) {
   const LiveState before = state;
@@ -102,8 +103,8 @@ bool LiveStepper::advance_once(LiveState& state, double h, const Eigen::VectorXd
 bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push,
                                      LiveReport& report) {
   const Eigen::VectorXd from = state.x;
-  // Forces are those of the body as walls let it be and move: within them, stiffness and damping throw back
-  // nodes that only come to rest there, and friction has nothing to hold them by.
+  // Forces are evaluated with the walls' constraints applied: inside walls, stiffness and damping would throw
+  // back nodes that merely come to rest there, and friction would have no effect.
   Eigen::VectorXd x = from, v = state.v;
   if (!options_.walls.empty()) {
     Eigen::VectorXd any = v, end = from + h * v;
@@ -118,7 +119,7 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
   const double kinetic_before = kinetic();
   for (const Index dof : body_.dof_of_free()) state.v[dof] += h * forces_[dof] / body_.mass()[dof];
   state.x += h * state.v;
-  // No stable step makes energy of this size by itself.
+  // A stable step does not create this much energy.
   const double work =
       (body_.load() + push).cwiseAbs().dot((state.x - from).cwiseAbs() + h * state.v.cwiseAbs());
   const double most = 4.0 * (kinetic_before + sums.energy + work);

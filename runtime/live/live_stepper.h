@@ -20,20 +20,20 @@ struct StepperOptions {
 
 /// Result of a step.
 struct LiveReport {
-  bool whole = true;   ///< else it diverged in the shortest steps too: the body was stopped where it was
-  int parts = 1;       ///< steps that it was cut into as it diverged, or where the body had become too stiff
-  Index inverted = 0;  ///< most quadrature points on its way
-  Index contacts = 0;  ///< nodes that a wall pushes
+  bool whole = true;   ///< false: it diverged in the shortest steps too, and the body was stopped
+  int parts = 1;       ///< parts of a divided step: it diverged, or the body became too stiff
+  Index inverted = 0;  ///< largest number of inverted quadrature points during the step
+  Index contacts = 0;  ///< nodes pushed by a wall
   FlowSums flow{};     ///< plastic flow
 };
 
 /// Counts of events during all steps.
 struct LiveCounts {
   std::int64_t steps = 0;
-  std::int64_t halved = 0;    ///< steps that were cut
-  std::int64_t stopped = 0;   ///< steps that diverged however short
-  std::int64_t inverted = 0;  ///< steps in which elements were inverted
-  Index most_inverted = 0;    ///< quadrature points in a step
+  std::int64_t halved = 0;    ///< divided steps
+  std::int64_t stopped = 0;   ///< steps that diverged at any length
+  std::int64_t inverted = 0;  ///< steps with inverted elements
+  Index most_inverted = 0;    ///< most inverted quadrature points in a step
   double plastic_work = 0.0;  ///< [J]
 
   void add(const LiveReport& report) noexcept;
@@ -51,7 +51,7 @@ class LiveStepper {
   LiveReport step(LiveState& state, const Eigen::VectorXd& push = {});
 
   [[nodiscard]] const LiveCounts& counts() const noexcept { return counts_; }
-  /// The factor of the last implicit step.
+  /// Factor of the last implicit step.
   [[nodiscard]] const TangentSolver& solver() const noexcept { return implicit_.solver(); }
 
  private:

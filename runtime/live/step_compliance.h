@@ -12,8 +12,8 @@ namespace palpate {
 
 /// The compliance W [m/N] of one step between all dofs of some nodes: by how much the step's end moves with
 /// the forces in it. By implicit Euler (M / h^2 + C_d / h + K)^-1 with the tangent at some positions; by
-/// semi-implicit Euler h^2 M^-1. Found some columns at a time, so that whoever steps a body can spread the
-/// work over steps.
+/// semi-implicit Euler h^2 M^-1. Found some columns at a time, so that the caller can spread the
+/// work over several steps.
 class StepCompliance {
  public:
   /// `body` must outlive this; `nodes`: mesh nodes.
@@ -42,7 +42,7 @@ class StepCompliance {
   Eigen::Index found_ = 0;  // computed columns
 };
 
-/// Q W Q^T: the compliance of a body that has turned by Q, blocks of d dofs each. In double precision.
+/// Q W Q^T: compliance of a body rotated by Q, in blocks of d dofs. In double precision.
 PackedGreens turned(const PackedGreens& W, const Mat3& Q, int d);
 
 }  // namespace palpate

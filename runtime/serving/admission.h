@@ -31,7 +31,7 @@ std::string proof_of(const std::string& token, std::string_view nonce);
 /// Compares in constant time.
 bool is_same_token(std::string_view given, std::string_view token) noexcept;
 
-/// What stands before the `?` of a request's target, and behind it the values of `token` and `nonce`, empty
+/// Path before the `?` of a request's target, and behind it the values of `token` and `nonce`, empty
 /// without, and whether `watch` is there.
 struct Target {
   std::string_view path;

@@ -15,7 +15,8 @@ struct ListenAddress {
 /// [ADDRESS:]PORT as a person writes it; nothing for all else.
 [[nodiscard]] std::optional<ListenAddress> parse_listen_address(const std::string& text);
 
-/// Who connects waits until a server has the socket, and is turned away when it is destroyed instead.
+/// Listening socket. A client that connects waits until a server takes the socket over, and is disconnected
+/// if the socket is destroyed instead.
 class ListeningSocket {
  public:
   /// Throws Error (port in use, unknown address), in which `who` names the listener.

@@ -26,10 +26,10 @@ std::size_t run_of(const Request& request, const ServedAddress& served);
 /// True for a request to upgrade to a WebSocket.
 bool wants_socket(const Request& request, const ServedAddress& served);
 
-/// Whether that only watches, and never steers.
+/// True if the request only watches, and never steers.
 bool only_watches(const Request& request);
 
-/// Whether it asks for a proof that the server has the token, before it shows its own.
+/// True for a request that asks the server to prove that it has the token, before it shows its own.
 bool wants_proof(const Request& request);
 
 /// Returns the proof.

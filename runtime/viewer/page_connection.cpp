@@ -56,7 +56,7 @@ void PageConnection::open_socket() {
   const Request& request = parser_->get();
   only_watches_ = palpate::only_watches(request);
   const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
-  stream_.expires_never();  // the socket has its own times
+  stream_.expires_never();  // the WebSocket has timeouts of its own
   socket_.emplace(std::move(stream_));
   websocket::stream_base::timeout times{};
   times.handshake_timeout = handshake_time;

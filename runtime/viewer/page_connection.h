@@ -38,7 +38,7 @@ class PageConnection : public Connection, public Page {
   void follow() override;
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept override;
   [[nodiscard]] bool only_watches() const noexcept override { return only_watches_; }
-  /// The run that it asks for; null before it has shown the token.
+  /// Run that it asked for; null before it has shown the token.
   [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   [[nodiscard]] bool is_stalled() const override;
 

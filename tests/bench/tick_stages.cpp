@@ -28,9 +28,9 @@ TickStages time_stages(const Body& body, State& state, const ToolPose& pose) {
   scratch.last.remember(state.contacts());
 
   TickStages stages;
-  stages.find = seconds([&] { find_contacts(body, state, scratch); });
-  stages.assemble = seconds([&] { assemble_contact(body, state, scratch); });
-  stages.solve = seconds([&] { solve_problem(scratch); });
+  stages.find = seconds([&] { find_contacts(body, state, scratch, Pass::first); });
+  stages.assemble = seconds([&] { assemble_contact(body, state, scratch, Pass::first); });
+  stages.solve = seconds([&] { scratch.solver.solve(scratch.problem); });
   stages.displace = seconds([&] { apply_forces(state, scratch); });
   stages.linearise = seconds([&] { linearise(body, state, scratch); });
   return stages;

@@ -165,8 +165,7 @@ TickStudy take_apart(const Body& body, const State& before, const ToolPose& pose
   study.rows = state.scratch.problem.rows;
   study.near = state.surface.near.count();
   study.new_nodes = new_nodes(before, state);
-  study.rounds = state.scratch.problem.frictionless ? state.scratch.solvers.active_set.rounds()
-                                                    : state.scratch.solvers.cone_solver.rounds();
+  study.rounds = state.scratch.solver.rounds();
   study.more_passes = more_passes(before, state);
   study.status = state.status;
   state = before;

@@ -60,6 +60,7 @@ struct Grid {
   void begin() {
     const Eigen::VectorXd r = b + W * lambda();
     std::copy_n(r.data(), problem.rows, problem.b.begin());
+    problem.base = problem.lambda;
   }
 
   [[nodiscard]] Eigen::Index at(std::size_t k) const { return static_cast<Eigen::Index>(k) * rows; }

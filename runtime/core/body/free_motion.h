@@ -44,7 +44,7 @@ struct MotionSample {
   /// Compliance for contact forces from then on, for a live or warped body; null: the body's Green's
   /// functions.
   std::shared_ptr<const Greens> compliance{};
-  /// [n] Of a live body: as the tool found it, moved along with it [m]; else empty.
+  /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
 };
 
@@ -117,8 +117,8 @@ class FreeMotion {
   /// Adds sign * u [n] to the motion until the next sample, to compensate a change of the displacement by
   /// contact forces when their compliance changes. Call after `receive`.
   void take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept;
-  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< of the last
-  /// Whether the packed dynamics are behind their time, after begin_tick: what is seen waits for them.
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< last sample's
+  /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 
  private:
@@ -174,14 +174,15 @@ class FreeMotion {
   bool dynamic_contact_;
   bool active_;
   std::int64_t ticks_ = 0;
-  std::int64_t phase_ = 1;        // of the present step's ticks, the last one ends it
-  std::vector<NodalLoad> loads_;  // [history] of the last ticks, in turn
-  std::vector<double> strains_;   // [history] the body's energy under them [J]
-  double returned_ = 0.0;         // of it, what the body gave back of late [J]
-  LetGo pending_;                 // not yet in the motion
+  std::int64_t phase_ = 1;        // tick within the present step, from 1; the last one ends it
+  std::vector<NodalLoad> loads_;  // [history] loads of the last ticks, cyclic
+  std::vector<double> strains_;   // [history] strain energies under them [J]
+  double returned_ = 0.0;         // strain energy released by the body recently [J]
+  LetGo pending_;                 // release not yet in the motion
 
-  // What stays where it was: until it is in the motion, and of modal dynamics what the modes do not carry.
-  std::vector<double> held_;          // [n] times fade_
+  // Displacement held fixed: until it enters the motion, and for modal dynamics the part not represented by
+  // modes.
+  std::vector<double> held_;          // [n] factor fade_
   std::vector<double> pending_held_;  // [n]
   double fade_ = 0.0;
   double since_let_go_ = 0.0;  // [s]
@@ -189,20 +190,20 @@ class FreeMotion {
   // Modal.
   std::optional<ModalNewmark> modal_;
   std::vector<double> q_before_;  // [k] at the beginning of the step
-  std::vector<double> q_held_;    // [k] the modes' part of held_
-  std::vector<double> shown_;     // [k] modal coordinates of what is seen, but for held_
-  std::vector<double> g_, rate_;  // [k] scratch
+  std::vector<double> q_held_;    // [k] modal part of held_
+  std::vector<double> shown_;     // [k] modal coordinates of the displayed motion, without held_
+  std::vector<double> g_, rate_;  // [k] workspace
 
   // Packed.
   MotionJob job_;
   std::int64_t sample_step_ = 0;
-  bool held_in_flight_ = false;       // held_ until a sample has it
-  std::int64_t sample_phase_ = 0;     // phase in which the sample came
-  std::vector<double> u_before_, u_;  // [n] samples between which the tick is
-  double share_ = 1.0;                // of u_
-  std::vector<double> untouched_;     // [n] of a live body
+  bool held_in_flight_ = false;       // held_ is in a job and not yet in a sample
+  std::int64_t sample_phase_ = 0;     // phase at which the sample arrived
+  std::vector<double> u_before_, u_;  // [n] samples between which the tick lies
+  double share_ = 1.0;                // weight of u_
+  std::vector<double> untouched_;     // [n] empty unless live
 
-  // By surface node.
+  // Per surface node.
   std::vector<std::int64_t> stamp_;  // tick of the value
   std::vector<Vec3> value_, change_;
 };

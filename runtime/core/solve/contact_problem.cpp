@@ -4,29 +4,28 @@
 
 namespace palpate {
 
-ContactProblem::ContactProblem(int d, Index max_contacts, Index few_rows, Index many_rows)
+ContactProblem::ContactProblem(int d, Index max_contacts, Index max_rows, Index max_single_rows)
     : dimension(d),
-      stride((few_rows + 7) / 8 * 8),
-      single_stride((many_rows + 15) / 16 * 16),
+      stride((max_rows + 7) / 8 * 8),
+      single_stride((max_single_rows + 15) / 16 * 16),
       first(static_cast<std::size_t>(max_contacts) + 1),
       friction(max_contacts),
       normal(max_contacts, Vec3::UnitX()),
       held(max_contacts),
       owner(max_contacts),
       W(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride)),
-      body_W(static_cast<std::size_t>(single_stride) * static_cast<std::size_t>(single_stride)),
-      single_W(body_W.size()),
+      single_W(static_cast<std::size_t>(single_stride) * static_cast<std::size_t>(single_stride)),
       b(std::max(stride, single_stride)),
+      base(b.size()),
       lambda(b.size()),
       guess(b.size()),
       prediction(b.size()) {}
 
-void ContactProblem::clear(bool are_many) noexcept {
+void ContactProblem::clear(bool is_single) noexcept {
   contacts = 0;
   rows = 0;
   frictionless = true;
-  many = are_many;
-  coupled = false;
+  single = is_single;
 }
 
 void ContactProblem::add(double mu, bool is_held, const Vec3& n) noexcept {
@@ -52,6 +51,7 @@ void ContactProblem::append(double mu, bool is_held, Index owner_of, const Vec3&
   first[k + 1] = rows + count;
   for (Index i = rows; i < rows + count; ++i) {
     b[i] = 0.0;
+    base[i] = 0.0;
     lambda[i] = 0.0;
     prediction[i] = 0.0;
   }
@@ -72,8 +72,9 @@ double ContactProblem::gap(Index contact) const noexcept {
     const Index at = first_row(contact) + i;
     if (n[i] == 0.0) continue;
     double r = b[at];
-    for (Index j = 0; j < rows; ++j)
-      r += many ? single_row(at)[j] * (lambda[j] - guess[j]) : w(at, j) * lambda[j];
+    with_w([&](auto w) {
+      for (Index j = 0; j < rows; ++j) r += w[at][j] * (lambda[j] - base[j]);
+    });
     sum += n[i] * r;
   }
   return sum;

@@ -1,10 +1,10 @@
 // Error estimate for forces that do not solve a contact problem.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "runtime/core/solve/contact_law.h"
 #include "runtime/core/solve/contact_problem.h"
 
 namespace palpate {
@@ -29,17 +29,14 @@ class Imbalance {
   [[nodiscard]] double residual() const noexcept { return residual_; }
 
  private:
-  enum class Mode : std::uint8_t { open, stick, slip };
-
   void find_motion(const ContactProblem& problem) noexcept;
-  void choose_mode(const ContactProblem& problem, Index contact) noexcept;
-  void keep_equations(const ContactProblem& problem, Index contact) noexcept;
+  void choose_mode(const ContactProblem& problem, ContactLaw& contact) noexcept;
+  void keep_equations(const ContactLaw& contact) noexcept;
 
-  std::vector<double> change_;  // [max rows]
-  std::vector<double> motion_;  // [max rows]
-  std::vector<double> step_;    // [max rows] forces to be multiplied by W
-  std::vector<Mode> mode_;      // [max contacts]
-  std::vector<Vec3> edge_;      // [max contacts] slipping: edge of the cone
+  std::vector<double> change_;        // [max rows]
+  std::vector<double> motion_;        // [max rows]
+  std::vector<double> step_;          // [max rows] forces to be multiplied by W
+  std::vector<ContactLaw> contacts_;  // [max contacts]
   double residual_ = 0.0;
 };
 

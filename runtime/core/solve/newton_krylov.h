@@ -1,25 +1,26 @@
 // Solver for contact with many points.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-#include <cstdint>
+#include <cstddef>
 #include <span>
 #include <vector>
 
+#include "base/memory.h"
+#include "runtime/core/solve/contact_law.h"
 #include "runtime/core/solve/contact_problem.h"
-#include "runtime/core/solve/gmres.h"
+#include "runtime/core/solve/reduced_contacts.h"
+#include "runtime/core/solve/symmetric_product.h"
 
 namespace palpate {
 
-/// Solves a ContactProblem with many contacts: block Gauss-Seidel sweeps, each contact solved exactly with
-/// the others fixed, and between them steps of a semismooth Newton method on Alart & Curnier's equations
-/// (1991) with three unknowns at a sticking contact and two at a slipping one, or one without friction,
-/// solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps smooth the forces and keep them inside the
-/// cones; Newton steps remove the errors for which sweeps converge slowly. It starts from the guess in lambda
-/// plus its predicted change, or from the guess alone if that is better, and costs almost nothing if the
-/// guess is the solution. W and all long vectors are in single precision: forces and motions change little
-/// from tick to tick. docs/decisions has the comparison with other methods. All memory is allocated at
+/// Solves a ContactProblem whose W is in single precision: block Gauss-Seidel sweeps, each contact solved
+/// exactly with the others as they are, and between them steps of a semismooth Newton method on Alart &
+/// Curnier's equations (1991) that has three unknowns at a contact that sticks, two at one that slips and one
+/// without friction, and is solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps make the forces
+/// smooth and keep them in the cones; Newton's steps solve what sweeps are slow at. It starts from the guess
+/// in lambda and the prediction of its change, or without that where it is no better, and costs next to
+/// nothing where the guess is the solution. All that is long is in single precision: forces and motions
+/// change little from tick to tick. docs/decisions has what it was compared with. All memory is taken at
 /// construction.
 ///
 /// Residual: the largest difference of the two sides of the equations at a contact, relative to the largest
@@ -33,9 +34,9 @@ class NewtonKrylov {
   /// the end of the budget: lambda is then the best found, inside the cones.
   bool solve(ContactProblem& problem) noexcept;
 
-  /// Improves lambda of a problem of few contacts, with W in double precision, to single-precision accuracy,
-  /// as `solve` does. False if the capacity is exceeded, or the residual exceeds `accepted`.
-  bool improve_few(ContactProblem& problem) noexcept;
+  /// Makes lambda better where W is in double precision: to the resolution of single precision, as `solve`
+  /// does. False when the capacity is exceeded, or the residual is over `accepted`.
+  bool improve(ContactProblem& problem) noexcept;
 
   /// Derivative of lambda with respect to b, for up to three changes: `db` and `dlambda` [changes x rows];
   /// dlambda holds a guess before, which may be zero. Contacts stay open, sticking or slipping as they are.
@@ -53,88 +54,43 @@ class NewtonKrylov {
   [[nodiscard]] std::span<const float> motion() const noexcept { return r_; }
 
  private:
-  enum class Kind : std::uint8_t { absent, normal, cone, held };
-  enum class Mode : std::uint8_t { open, stick, slip };
-  static constexpr int most_changes = 3;
-
-  struct Contact {
-    Index first = 0;  // row
-    int rows = 0;
-    Index owner = -1;  // contact of a held row
-    Kind kind = Kind::held;
-    Mode mode = Mode::open;
-    double mu = 0.0;
-    double w = 0.0;                                         // mean of the diagonal of W
-    Vec3 n = Vec3::Zero();                                  // normal in the axes of the rows
-    Eigen::Matrix3d D = Eigen::Matrix3d::Identity();        // block of W for the contact itself
-    Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // inverse of D
-    Vec3 e = Vec3::Zero();                                  // slipping: direction of the tangential force
-    Vec3 across = Vec3::Zero();                             // slipping: direction across it
-    double turning = 0.0;                                   // slipping: motion across per force across [m/N]
-  };
-
-  /// Contact that is not open, in the reduced system of GMRES: three unknowns if it sticks, two if it slips.
-  /// Matrices are row-major.
-  struct Reduced {
-    Index first = 0;  // row
-    int rows = 0;
-    std::array<float, 9> image{};    // forces from unknowns
-    std::array<float, 9> test{};     // equations from motions
-    std::array<float, 9> inverse{};  // unknowns from equations, for the contact alone
-    float turning = 0.0F;            // second equation from the second unknown
-  };
-
-  void load(ContactProblem& problem) noexcept;
-  void enter_cone(const Contact& contact) noexcept;
+  [[nodiscard]] std::span<ContactLaw> contacts() noexcept { return std::span(contacts_).first(count_); }
+  [[nodiscard]] std::span<const ContactLaw> contacts() const noexcept {
+    return std::span(contacts_).first(count_);
+  }
+  void load(const ContactProblem& problem, const SymmetricRows& W) noexcept;
+  [[nodiscard]] const float* row(Index i) const noexcept { return W_.entries + W_.stride * i; }
+  void set_force(const ContactLaw& contact, const Vec3& force) noexcept;
   void enter_cones() noexcept;
+  bool move_by_change() noexcept;
   void find_motion(const ContactProblem& problem) noexcept;
-  void move_by_change(const ContactProblem& problem) noexcept;
-  void predict(const ContactProblem& problem) noexcept;
+  void predict(std::span<const double> prediction) noexcept;
   void keep_best() noexcept;
-  template <typename Real>
-  [[nodiscard]] Vec3 at(const std::vector<Real>& v, const Contact& contact) const noexcept;
-  void change_force(const Contact& contact, const Vec3& change) noexcept;
-  void open(const Contact& contact) noexcept;
-  [[nodiscard]] bool is_present(const Contact& contact) const noexcept;
-  [[nodiscard]] Vec3 suiting_change(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
-  [[nodiscard]] Vec3 slipping_force(const Contact& contact, const Vec3& f, const Vec3& r,
-                                    const Vec3& sticking) const noexcept;
-  [[nodiscard]] Vec3 difference(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
-  void sweep(const ContactProblem& problem) noexcept;
-  void find_residual() noexcept;
-  [[nodiscard]] bool may_press(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
-  void choose_modes() noexcept;
-  void move_to_modes(const ContactProblem& problem) noexcept;
-  bool newton_step(const ContactProblem& problem) noexcept;
-  void reduce() noexcept;
-  void fill_image(const float* y, float* x) const noexcept;
-  void test(const float* motion, float* out) const noexcept;
-  void multiply_by_compliance(const ContactProblem& problem, int systems) noexcept;
-  void solve_reduced(const ContactProblem& problem, int systems) noexcept;
-  bool fill_guess(std::span<const double> dlambda, int changes) noexcept;
-  [[nodiscard]] double product_work() const noexcept;
-  [[nodiscard]] double round_work(bool with_step) const noexcept;
-  void count_product() noexcept;
-  [[nodiscard]] int most_steps() const noexcept;
   void take_best() noexcept;
+  template <typename Real>
+  [[nodiscard]] Vec3 at(const std::vector<Real>& v, const ContactLaw& contact) const noexcept;
+  void change_force(const ContactLaw& contact, const Vec3& change) noexcept;
+  void open(const ContactLaw& contact) noexcept;
+  [[nodiscard]] bool is_present(const ContactLaw& contact) const noexcept;
+  void sweep() noexcept;
+  void find_residual() noexcept;
+  void choose_modes() noexcept;
+  void move_to_modes() noexcept;
+  bool newton_step() noexcept;
+  bool iterate(ContactProblem& problem, std::span<const double> prediction) noexcept;
+  [[nodiscard]] double round_work(bool with_step) const noexcept;
+  void count_products(int products) noexcept;
 
-  std::ptrdiff_t stride_;  // length of vectors
-  std::vector<Contact> contacts_;
-  Index count_ = 0;
-  Index rows_ = 0;
+  std::vector<ContactLaw> contacts_;
+  std::size_t count_ = 0;
+  SymmetricRows W_{};  // of the problem, or of `improved_`
   std::vector<double> f_,
       best_f_;  // [rows] forces: the sum of single-precision changes; those of the smallest residual
-  std::vector<float> r_, best_r_;          // [rows] motion
-  std::vector<double> few_b_, few_guess_;  // [rows] for a problem of few contacts
+  std::vector<float> r_, best_r_;  // [rows] motion
   std::vector<float> change_, product_;
-  std::ptrdiff_t padded_rows_ = 0;
-  std::vector<Reduced> reduced_;  // [max_contacts] the first active_ are used
-  std::size_t active_ = 0;        // number of contacts that are not open
-  std::vector<Gmres> gmres_;      // [most_changes]
-  std::vector<float> x_, v_;      // [most_changes x stride] forces, and motions by them
-  std::vector<float> y_;          // [most_changes x stride] unknowns
-  std::vector<float> step_;       // [stride]
-  std::vector<float> motions_;    // [most steps x stride] motions by the images of GMRES, for one system
+  std::ptrdiff_t improved_stride_;
+  LargeVector<float> improved_;  // [improved stride x the same] W of a problem in double precision
+  ReducedContacts reduced_;
   int products_ = 0;
   double work_ = 0.0;  // multiplications
   int rounds_ = 0;

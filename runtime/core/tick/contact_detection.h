@@ -11,6 +11,6 @@ namespace palpate {
 /// are merged (contact_merging.h), and if there are still more than max_contacts, the deepest are kept. A
 /// sphere with a radius of over three edges touches corners only. The nodes of all contacts are in
 /// state.surface.near.
-void find_contacts(const ElasticBody& body, State& state, Scratch& scratch) noexcept;
+void find_contacts(const ElasticBody& body, State& state, Scratch& scratch, Pass pass) noexcept;
 
 }  // namespace palpate

@@ -83,11 +83,7 @@ bool is_rough(const ElasticBody& body, const State& state) noexcept {
 
 /// True if another pass would be fast, and the body is not released, after which it vibrates.
 bool may_repeat(const ElasticBody& body, const State& state, const Scratch& scratch) noexcept {
-  const ContactProblem& problem = scratch.problem;
-  const bool was_easy =
-      problem.many ? problem.rows <= tuning.passes.most_rows && scratch.solvers.newton_krylov.was_easy()
-                   : problem.frictionless || scratch.solvers.cone_solver.was_easy();
-  return was_easy && !scratch.solvers.was_improved && !is_released(body, state);
+  return scratch.solver.was_easy(scratch.problem) && !is_released(body, state);
 }
 
 /// Switches to the requested patch. The old one is kept if the capacity is exceeded.
@@ -102,7 +98,7 @@ void change_patch(const ElasticBody& body, State& state) noexcept {
 /// True if an iterative solver changed no force of the last tick significantly.
 bool changes_nothing(const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if ((problem.frictionless && !problem.many) || scratch.merging.has_changed) return false;
+  if (scratch.solver.rounding() == 0.0 || scratch.merging.has_changed) return false;
   double largest = 0.0;
   double all = 0.0;
   for (Index k = 0; k < scratch.last.count; ++k) {
@@ -110,7 +106,7 @@ bool changes_nothing(const Scratch& scratch) noexcept {
     largest = std::max(largest, squared);
     all += squared;
   }
-  const double most = (problem.many ? tuning.many.no_change : tuning.cone.no_change) * std::sqrt(largest);
+  const double most = scratch.solver.rounding() * std::sqrt(largest);
   for (Index i = 0; i < problem.rows; ++i) {
     if (std::abs(problem.lambda[i] - problem.guess[i]) > most) return false;
     all -= problem.guess[i] * problem.guess[i];
@@ -133,16 +129,15 @@ void recall_contacts(State& state, const LastContacts& remembered) noexcept {
 }
 
 /// Performs one Newton step at the present positions.
-ContactOutcome solve_pass(const ElasticBody& body, State& state, Scratch& scratch) noexcept {
-  assemble_contact(body, state, scratch);
-  std::copy_n(scratch.problem.lambda.begin(), scratch.problem.rows, scratch.problem.guess.begin());
-  scratch.solvers.is_solved = solve_problem(scratch);
-  if (!scratch.solvers.is_solved) state.status |= StepStatus::not_converged;
+ContactOutcome solve_pass(const ElasticBody& body, State& state, Scratch& scratch, Pass pass) noexcept {
+  assemble_contact(body, state, scratch, pass);
+  scratch.is_solved = scratch.solver.solve(scratch.problem);
+  if (!scratch.is_solved) state.status |= StepStatus::not_converged;
   if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
     return ContactOutcome::not_finite;
   }
-  if (scratch.solvers.is_solved && scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way &&
+  if (scratch.is_solved && pass == Pass::first && state.still_ticks > 1 && !state.goes_half_way &&
       changes_nothing(scratch)) {
     recall_contacts(state, scratch.last);
     tell_rigid_contacts(state);
@@ -150,7 +145,7 @@ ContactOutcome solve_pass(const ElasticBody& body, State& state, Scratch& scratc
   }
   apply_forces(state, scratch);
   retreat_from_leaps(body, state);
-  if (scratch.is_first_pass) halve_return(body, state, scratch.detection);
+  if (pass == Pass::first) halve_return(body, state, scratch.detection);
   move_tools(body, state);
   move_near_surface(body, state.surface);
   return ContactOutcome::solved;
@@ -159,13 +154,14 @@ ContactOutcome solve_pass(const ElasticBody& body, State& state, Scratch& scratc
 /// Slip of a sticking contact due to the solver's tolerance.
 Vec3 carried_slip(const Scratch& scratch, Index k) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if (problem.held[k] != 0 || problem.rows_of(k) < 2) return Vec3::Zero();
+  const std::span<const float> left = scratch.solver.left_motion();
+  if (left.empty() || problem.held[k] != 0 || problem.rows_of(k) < 2) return Vec3::Zero();
   const Vec3& n = problem.normal[k];
   Vec3 force = Vec3::Zero();
   Vec3 motion = Vec3::Zero();
   for (Index i = 0; i < problem.rows_of(k); ++i) {
     force[i] = problem.lambda[problem.first_row(k) + i];
-    motion[i] = scratch.solvers.newton_krylov.motion()[problem.first_row(k) + i];
+    motion[i] = left[problem.first_row(k) + i];
   }
   const double normal = n.dot(force);
   const double bound = problem.friction[k] * normal * (1.0 - tuning.many.slipping);
@@ -179,7 +175,7 @@ void give_contact_force(const Scratch& scratch, Index number, ContactPoint& cont
   for (Index i = 0; i < scratch.problem.rows_of(number); ++i)
     contact.force +=
         scratch.problem.lambda[first + static_cast<std::size_t>(i)] * scratch.rows[first + i].force;
-  contact.carry = scratch.problem.many ? carried_slip(scratch, number) : Vec3(Vec3::Zero());
+  contact.carry = carried_slip(scratch, number);
 }
 
 /// Rotates the forces of rolling contacts as their faces and edges tilt.
@@ -194,34 +190,6 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
 }
 
 }  // namespace
-
-bool solve_problem(Scratch& scratch) noexcept {
-  scratch.solvers.was_improved = false;
-  if (scratch.problem.many) return scratch.solvers.newton_krylov.solve(scratch.problem);
-  if (scratch.problem.frictionless) return scratch.solvers.active_set.solve(scratch.problem);
-  if (scratch.solvers.cone_solver.solve(scratch.problem)) return true;
-  // On a nearly singular W Newton steps cycle where sweeps converge. From there Newton steps can finish.
-  scratch.solvers.was_improved = true;
-  scratch.solvers.newton_krylov.improve_few(scratch.problem);
-  return scratch.solvers.cone_solver.solve(scratch.problem);
-}
-
-void find_force_changes(Scratch& scratch, int changes) noexcept {
-  const ContactProblem& problem = scratch.problem;
-  if (problem.many) {
-    scratch.solvers.newton_krylov.derivative(problem, changes, scratch.changes.of_rows,
-                                             scratch.changes.of_forces);
-  } else if (problem.frictionless) {
-    scratch.solvers.active_set.derivative(problem, changes, scratch.changes.of_rows,
-                                          scratch.changes.of_forces);
-  } else {
-    for (std::size_t s = 0; s < static_cast<std::size_t>(changes); ++s) {
-      const std::size_t begin = s * static_cast<std::size_t>(problem.rows);
-      scratch.solvers.cone_solver.derivative(problem, std::span(scratch.changes.of_rows).subspan(begin),
-                                             std::span(scratch.changes.of_forces).subspan(begin));
-    }
-  }
-}
 
 void apply_forces(State& state, const Scratch& scratch) noexcept {
   state.surface.near.unload();
@@ -253,23 +221,18 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
 }
 
 ContactOutcome solve_contact(const ElasticBody& body, State& state, Scratch& scratch) noexcept {
-  scratch.is_first_pass = true;
   scratch.problem.moves = state.still_ticks == 0;
-  find_contacts(body, state, scratch);
+  find_contacts(body, state, scratch, Pass::first);
   change_patch(body, state);
   bool rough = is_rough(body, state);
-  ContactOutcome outcome = solve_pass(body, state, scratch);
-  scratch.is_first_pass = false;
-  const auto wants_pass = [&](int pass) {
-    return rough && outcome == ContactOutcome::solved && pass < tuning.passes.most &&
-           may_repeat(body, state, scratch);
-  };
-  for (int pass = 1; wants_pass(pass); ++pass) {
+  ContactOutcome outcome = solve_pass(body, state, scratch, Pass::first);
+  for (int pass = 1; rough && pass < tuning.passes.most; ++pass) {
+    if (outcome != ContactOutcome::solved || !may_repeat(body, state, scratch)) break;
     scratch.last.remember(state.contacts());
-    find_contacts(body, state, scratch);
+    find_contacts(body, state, scratch, Pass::repeated);
     rough = is_rough(body, state);
     if (rough) {
-      outcome = solve_pass(body, state, scratch);
+      outcome = solve_pass(body, state, scratch, Pass::repeated);
     } else {
       recall_contacts(state, scratch.last);
     }

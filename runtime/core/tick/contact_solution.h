@@ -7,15 +7,6 @@
 
 namespace palpate {
 
-/// Computes scratch.problem.lambda for the rows of scratch.problem: with the active set if there is no
-/// friction, otherwise with the cone solver. False if it did not reach its tolerance.
-bool solve_problem(Scratch& scratch) noexcept;
-
-/// Computes changes of lambda for changes of b: the first `changes` ones in scratch.changes.of_rows,
-/// concatenated, into scratch.changes.of_forces, which for many contacts holds a guess before. Call after
-/// solve_problem.
-void find_force_changes(Scratch& scratch, int changes) noexcept;
-
 /// Passes scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.
 void apply_forces(State& state, const Scratch& scratch) noexcept;
 

@@ -128,15 +128,6 @@ double missing_of_left_out(const ElasticBody& body, const State& state, Scratch&
   return given_way > depth_there ? depth_there / given_way * sum.norm() : sum.norm();
 }
 
-/// Error from the change of the force by a Newton step. The solver for few contacts stops early where such
-/// steps cycle: there they are much too long, the residual is much too small, and the true error lies between
-/// (docs/decisions).
-double error_of_solver(const Scratch& scratch, double step) noexcept {
-  if (scratch.solvers.is_solved) return 0.0;
-  return scratch.problem.many ? tuning.hand.error_margin * step
-                              : std::sqrt(step * scratch.force_error.imbalance.residual());
-}
-
 }  // namespace
 
 void leave_out_simplex(const ElasticBody& body, const State& state, DetectionScratch& detection, Index tool,
@@ -165,7 +156,7 @@ void leave_out_contact(const ElasticBody& body, const State& state, DetectionScr
 
 void begin_force_error(Scratch& scratch) noexcept {
   std::fill(scratch.force_error.missing_force.begin(), scratch.force_error.missing_force.end(), Vec3::Zero());
-  if (scratch.solvers.is_solved) return;
+  if (scratch.is_solved) return;
   scratch.force_error.imbalance.find(scratch.problem);
   for (Index i = 0; i < scratch.problem.rows; ++i) {
     const ContactRow& row = scratch.rows[i];
@@ -175,7 +166,7 @@ void begin_force_error(Scratch& scratch) noexcept {
 }
 
 void note_answer(Scratch& scratch, Index tool, int axis, Index begin) noexcept {
-  if (scratch.solvers.is_solved) return;
+  if (scratch.is_solved) return;
   double sum = 0.0;
   for (Index i = 0; i < scratch.problem.rows; ++i)
     sum += scratch.changes.of_forces[begin + i] * scratch.force_error.imbalance.motion()[i];
@@ -186,7 +177,9 @@ void find_force_errors(const ElasticBody& body, State& state, Scratch& scratch) 
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
     ToolState& tool = state.tools[k];
     const auto number = static_cast<Index>(k);
-    tool.force_error = error_of_solver(scratch, scratch.force_error.missing_force[k].norm());
+    tool.force_error = scratch.is_solved ? 0.0
+                                         : scratch.solver.error(scratch.force_error.missing_force[k].norm(),
+                                                                scratch.force_error.imbalance.residual());
     const Pressed pressed =
         tool.engaged ? count_pressed(state, scratch.detection, number, body.mean_surface_edge()) : Pressed{};
     tool.left_out = static_cast<Index>(std::ceil(pressed.contact_points));

@@ -4,7 +4,7 @@
 
 #include "runtime/core/body/elastic_body.h"
 #include "runtime/core/body/near_field.h"
-#include "runtime/core/tick/compliance.h"
+#include "runtime/core/touch/compliance.h"
 
 namespace palpate {
 

@@ -7,11 +7,10 @@
 #include <span>
 
 #include "runtime/core/solve/tick_tuning.h"
-#include "runtime/core/tick/contact_solution.h"
 #include "runtime/core/tick/force_error.h"
 #include "runtime/core/tick/greens_error.h"
 #include "runtime/core/tick/linearise_rolling.h"
-#include "runtime/core/tick/rolling.h"
+#include "runtime/core/touch/rolling.h"
 
 namespace palpate {
 namespace {
@@ -101,10 +100,9 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
 /// Initialises changes of forces with those of the last tick, for many contacts.
 void guess_force_changes(const State& state, Scratch& scratch, Index number) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if (!problem.many) return;
   const int d = problem.dimension;
   std::fill_n(scratch.changes.of_forces.begin(), d * problem.rows, 0.0);
-  for (Index k = 0; k < state.contact_count; ++k) {
+  for (Index k = 0; k < scratch.assembly.response_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     if (contact.tool != number) continue;
     for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
@@ -117,8 +115,7 @@ void guess_force_changes(const State& state, Scratch& scratch, Index number) noe
 
 void keep_force_changes(const State& state, Scratch& scratch, Index number) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if (!problem.many) return;
-  for (Index k = 0; k < state.contact_count; ++k) {
+  for (Index k = 0; k < scratch.assembly.response_count; ++k) {
     if (state.contact_points[k].tool != number) continue;
     Eigen::Matrix3d& response = scratch.assembly.response[k];
     response.setZero();
@@ -136,7 +133,7 @@ Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& 
   const Vec3 turn = turned.angle() * turned.axis();
   fill_row_change(state, scratch, number, Vec3::Zero(), turn);
   std::fill_n(scratch.changes.of_forces.begin(), scratch.problem.rows, 0.0);
-  find_force_changes(scratch, 1);
+  scratch.solver.derivative(scratch.problem, 1, scratch.changes.of_rows, scratch.changes.of_forces);
   Wrench change = wrench_of(state, scratch, number, 0);
   for (const ContactPoint& contact : state.contacts()) {
     if (contact.tool == number && contact.held) change.torque += turn.cross(contact.arm).cross(contact.force);
@@ -166,7 +163,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
   if (rolls) {
     force = force_change_by_rolling(state, scratch, number);
   } else {
-    find_force_changes(scratch, d);
+    scratch.solver.derivative(scratch.problem, d, scratch.changes.of_rows, scratch.changes.of_forces);
   }
   keep_force_changes(state, scratch, number);
   Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();

@@ -5,7 +5,6 @@
 
 #include "runtime/core/solve/tick_tuning.h"
 #include "runtime/core/solve/vector_loops.h"
-#include "runtime/core/tick/contact_solution.h"
 
 namespace palpate {
 namespace {
@@ -199,7 +198,7 @@ VectorLanes change_by_rolling(Scratch& scratch, Index number, double coupling) n
     VectorLanes given_way = turned;
     for (Lanes& value : given_way) value /= coupling;
     add_motion_to_rows<D>(scratch, given_way, number);
-    find_force_changes(scratch, D);
+    scratch.solver.derivative(scratch.problem, D, scratch.changes.of_rows, scratch.changes.of_forces);
     const VectorLanes last_step = step;
     step = take_forces<D>(scratch, number);
     for (std::size_t axis = 0; axis < 3; ++axis) step[axis] += turned[axis] - change[axis];

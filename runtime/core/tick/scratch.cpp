@@ -110,22 +110,17 @@ DetectionScratch::DetectionScratch(const ElasticBody& body, Index tools, Index m
       left_out(candidates.size() + std::min(most_simplices_left_out, found.size())) {}
 
 AssemblyScratch::AssemblyScratch(const ElasticBody& body, Index max_contacts, Index near_nodes)
-    : row_first(size(few_rows(body, max_contacts))),
-      row_body(row_first.size()),
-      row_response(size(body.dimension() * near_nodes)),
+    : row_response(size(body.dimension() * near_nodes)),
       guess_force(row_response.size()),
       upcoming(size(max_contacts)),
       order(upcoming.size()),
       response(upcoming.size()),
       last_response(upcoming.size()),
-      compliance(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
-      coupling(size(6 * most_rows(body, many(max_contacts)))),
+      compliance(few_rows(body, max_contacts), most_rows(body, many(max_contacts)),
+                 body.dimension() * near_nodes),
+      coupling(std::vector<double>(size(6 * few_rows(body, max_contacts))),
+               std::vector<float>(size(6 * most_rows(body, many(max_contacts))))),
       tilt_spring(size(most_rows(body, max_contacts))) {}
-
-SolverScratch::SolverScratch(const ElasticBody& body, Index max_contacts)
-    : active_set(few_rows(body, max_contacts)),
-      cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
-      newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))) {}
 
 ForceErrorScratch::ForceErrorScratch(const ElasticBody& body, Index tools, Index max_contacts)
     : imbalance(body.dimension() * max_contacts, most_rows(body, max_contacts)),
@@ -147,7 +142,9 @@ Scratch::Scratch(const ElasticBody& body, Index tools, Index max_contacts, const
               most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
       assembly(body, max_contacts, near.capacity()),
-      solvers(body, max_contacts),
+      solver(few_rows(body, max_contacts),
+             {body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))},
+             {body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))}),
       force_error(body, tools, max_contacts),
       greens_error(body, near),
       changes(body, max_contacts),

@@ -5,18 +5,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "runtime/core/body/elastic_body.h"
-#include "runtime/core/solve/active_set.h"
-#include "runtime/core/solve/cone_solver.h"
 #include "runtime/core/solve/contact_problem.h"
+#include "runtime/core/solve/contact_solver.h"
 #include "runtime/core/solve/imbalance.h"
-#include "runtime/core/solve/newton_krylov.h"
-#include "runtime/core/tick/compliance.h"
 #include "runtime/core/tick/greens_error.h"
-#include "runtime/core/tick/rolling.h"
+#include "runtime/core/touch/compliance.h"
 #include "runtime/core/touch/contact_point.h"
+#include "runtime/core/touch/rolling.h"
 #include "runtime/core/touch/touching_pair.h"
 
 namespace palpate {
@@ -99,31 +98,18 @@ struct DetectionScratch {
 struct AssemblyScratch {
   AssemblyScratch(const ElasticBody& body, Index max_contacts, Index near_nodes);
 
-  std::vector<std::ptrdiff_t> row_first;        ///< [few rows] column of C of the row's only node
-  std::vector<std::array<double, 4>> row_body;  ///< [few rows] factors of the row for that node
-  std::vector<double> row_response;             ///< [d near_nodes] column of Xi J^T [m/N]
-  std::vector<double> guess_force;              ///< [d near_nodes] many contacts [N]
-  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] many contacts
-  std::vector<Index> order;                     ///< [max_contacts] many contacts: the contact at each place
-  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] from `linearise` with many contacts: change of
-                                          ///< the force by a motion of the tool's device, one column per axis
-                                          ///< [N/m]
+  std::vector<double> row_response;       ///< [d near_nodes] column of Xi J^T [m/N]
+  std::vector<double> guess_force;        ///< [d near_nodes] [N]
+  std::vector<UpcomingContact> upcoming;  ///< [max_contacts]
+  std::vector<Index> order;               ///< [max_contacts] where W is kept: who comes to each place
+  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] `linearise`: change of the force by a motion of
+                                          ///< the tool's device, a column an axis [N/m]
   std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] response of the last tick or pass
   Index response_count = 0;
-  BodyCompliance compliance;        ///< many contacts: compliance of the body
-  std::vector<float> coupling;      ///< [6 x rows] many contacts: forces and moments
+  BodyCompliance compliance;
+  std::tuple<std::vector<double>, std::vector<float>> coupling;  ///< [6 x rows] forces and moments, for W in
+                                                                 ///< double and in single precision
   std::vector<double> tilt_spring;  ///< [rows] compliance of the tilt of edges and faces [m/N]
-};
-
-/// Solvers, and the result of the last pass.
-struct SolverScratch {
-  SolverScratch(const ElasticBody& body, Index max_contacts);
-
-  ActiveSet active_set;        ///< without friction
-  ConeSolver cone_solver;      ///< with friction
-  NewtonKrylov newton_krylov;  ///< many contacts
-  bool is_solved = true;       ///< solved to its tolerance
-  bool was_improved = false;   ///< few contacts needed the second solver
 };
 
 /// Workspace for the error estimate of a best effort.
@@ -145,6 +131,10 @@ struct ChangeScratch {
   RollingScratch rolling;         ///< rotation of normals
 };
 
+/// Newton's passes within a tick. In those after the first one, tools and surface are where the device and
+/// the body's own motion have taken them.
+enum class Pass : std::uint8_t { first, repeated };
+
 /// Data passed between the stages of a tick, grouped by the stage that writes them. No tick needs them from
 /// the previous one, except `high_water` and the compliance and responses of many contacts, which otherwise
 /// are computed from scratch. The problem's forces may be read until the next tick. Allocated at
@@ -156,11 +146,11 @@ struct Scratch {
   LastContacts last;
   DetectionScratch detection;
   MergingScratch merging;
-  bool is_first_pass = true;     ///< solve_contact: first of the tick's Newton passes
   ContactProblem problem;        ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;  ///< [rows] assembly: J
   AssemblyScratch assembly;
-  SolverScratch solvers;
+  ContactSolver solver;
+  bool is_solved = true;  ///< the last pass, to the solver's tolerance
   ForceErrorScratch force_error;
   GreensErrorScratch greens_error;       ///< linearise: for compressed Green's functions
   ChangeScratch changes;                 ///< linearise

@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// What a tick could not do; no bit is set when all is well. Bits 5 and 14 are free. The
+/// Limitations of a tick; no bit is set when all is well. Bits 5 and 14 are free. The
 /// reference shows these comments.
 enum class StepStatus : std::uint32_t {
   ok = 0,
@@ -23,7 +23,7 @@ enum class StepStatus : std::uint32_t {
   handing_over = 1U << 10,      ///< the force approaches that of the contact gradually, to avoid a kick
   older_patch = 1U << 11,       ///< the overlay for this place was not ready: an older one was used, or none
   late_motion = 1U << 12,    ///< the free motion of the body was not ready in time: the surface waits for it
-  rigid_contact = 1U << 13,  ///< the tool presses on what cannot move: only its coupling gives way
+  rigid_contact = 1U << 13,  ///< the tool presses on a rigid part: only its coupling deforms
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {

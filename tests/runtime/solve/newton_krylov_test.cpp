@@ -248,6 +248,7 @@ TEST(NewtonKrylov, HeldRowsAreMetOrLeftOutWithTheirOwners) {
   Eigen::VectorXd r = b;
   for (int k = 0; k < 10; ++k) {
     std::copy_n(r.data(), problem.rows, problem.b.begin());
+    problem.base = problem.lambda;
     ASSERT_TRUE(solver.solve(problem));
     r = b + W * lambda;
   }

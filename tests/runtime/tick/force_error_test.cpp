@@ -82,16 +82,16 @@ TEST_P(ForceError, OfForcesThatAreAHundredthTooLarge) {
   for (const double friction : {0.0, 0.5}) {
     State state = pressed({.radius = GetParam() == 3 ? 2.0 : 0.8, .friction = friction}, depth_, 200);
     Scratch& scratch = state.scratch;
-    EXPECT_EQ(scratch.problem.many, GetParam() == 3 && friction > 0.0) << "both solvers are looked at";
+    EXPECT_EQ(scratch.problem.single, GetParam() == 3 && friction > 0.0) << "both solvers are looked at";
     const Vec3 force = tool_of(state).contact_wrench.force;
     for (Index i = 0; i < scratch.problem.rows; ++i) scratch.problem.lambda[i] *= 1.01;
-    scratch.solvers.is_solved = false;
+    scratch.is_solved = false;
     linearise(body_, state, scratch);
     find_force_errors(body_, state, scratch);
     EXPECT_LT((scratch.force_error.missing_force[0] + 0.01 * force).norm(), 1e-3 * force.norm()) << friction;
     const double step = scratch.force_error.missing_force[0].norm();
-    const double said = scratch.problem.many ? tuning.hand.error_margin * step
-                                             : std::sqrt(step * scratch.force_error.imbalance.residual());
+    const double said = scratch.problem.single ? tuning.hand.error_margin * step
+                                               : std::sqrt(step * scratch.force_error.imbalance.residual());
     EXPECT_NEAR(tool_of(state).force_error, said, 1e-9 * force.norm());
     EXPECT_EQ(tool_of(state).left_out, 0);
   }

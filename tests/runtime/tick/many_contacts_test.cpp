@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "runtime/core/solve/tick_tuning.h"
-#include "runtime/core/tick/compliance.h"
 #include "runtime/core/tick/step.h"
+#include "runtime/core/touch/compliance.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
@@ -71,14 +71,14 @@ class Compliance : public testing::Test {
     }
   }
 
-  void assemble(Index tilts) {
+  void assemble(Index tilts, bool apart = false, bool single = true) {
     const auto count = static_cast<Index>(rows_.size());
-    problem_.clear(true);
+    problem_.clear(single);
     for (Index i = 0; i < count; ++i) problem_.add(0.0, false);
-    compliance_.assemble(near_, rows_, count - tilts, problem_);
+    compliance_.assemble(near_, rows_, count - tilts, apart, problem_);
   }
 
-  void expect_exact() {
+  Eigen::MatrixXd exact() {
     const auto count = static_cast<Eigen::Index>(rows_.size());
     const Eigen::Index width = Eigen::Index{3} * near_.count();
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(count, width), C(width, width);
@@ -91,9 +91,16 @@ class Compliance : public testing::Test {
           J.row(i).segment<3>(Eigen::Index{3} * row.places[n]) += row.body[n].transpose();
       }
     }
-    const Eigen::MatrixXd exact = J * C * J.transpose();
+    return J * C * J.transpose();
+  }
+
+  void expect_exact() {
+    const MatrixRows<float> W =
+        compliance_.body(MatrixRows<float>{problem_.single_row(0), problem_.single_stride});
+    const auto count = static_cast<Eigen::Index>(rows_.size());
+    const Eigen::MatrixXd exact = this->exact();
     for (Eigen::Index i = 0; i < count; ++i) {
-      const float* w = problem_.single_row(static_cast<Index>(i));
+      const float* w = W[static_cast<Index>(i)];
       for (Eigen::Index j = 0; j < count; ++j)
         ASSERT_NEAR(w[j], exact(i, j), 2e-6 * std::sqrt(exact(i, i) * exact(j, j))) << i << " " << j;
       for (Eigen::Index j = count; j < problem_.single_stride && j < (count + 15) / 16 * 16; ++j)
@@ -111,8 +118,8 @@ class Compliance : public testing::Test {
   NearField near_{cube(), 90};
   std::vector<ContactRow> rows_;
   std::vector<std::array<Index, 3>> named_;
-  ContactProblem problem_{3, 60, 0, 60};
-  BodyCompliance compliance_{60, 3 * 90};
+  ContactProblem problem_{3, 60, 60, 60};
+  BodyCompliance compliance_{60, 60, 3 * 90};
 };
 
 TEST_F(Compliance, IsThatOfTheBodyWhateverIsKept) {
@@ -181,6 +188,36 @@ TEST_F(Compliance, IsMadeAnewWithAnotherOverlayAndWhereItWasForgotten) {
   expect_exact();
 }
 
+// What couplings give way is added to the problem's W, not to what is kept.
+TEST_F(Compliance, IsKeptApartWhereWIsToBeAddedTo) {
+  near_.begin_tick();
+  for (std::size_t k = 0; k < 24; ++k) rows_.push_back(row(k, 1));
+  assemble(0);
+  assemble(0, true);
+  EXPECT_EQ(compliance_.renewed(), 24) << "it is elsewhere now";
+  std::fill(problem_.single_W.begin(), problem_.single_W.end(), 1.0F);
+  assemble(0, true);
+  EXPECT_EQ(compliance_.renewed(), 0);
+  EXPECT_EQ(problem_.single_W[5], 1.0F);
+  expect_exact();
+}
+
+// Rows of one node and of three, as vertices, edges and faces have them.
+TEST_F(Compliance, IsExactInDoublePrecision) {
+  near_.begin_tick();
+  for (std::size_t k = 0; k < 12; ++k) rows_.push_back(row(k, 1));
+  for (std::size_t k = 0; k < 12; ++k) rows_.push_back(row(20 + 3 * k, 3));
+  assemble(0);
+  assemble(0, false, false);
+  const Eigen::MatrixXd W = exact();
+  for (Index i = 0; i < 24; ++i) {
+    for (Index j = 0; j < 24; ++j)
+      ASSERT_NEAR(problem_.w(i, j), W(i, j), 1e-14 * std::sqrt(W(i, i) * W(j, j))) << i << " " << j;
+  }
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 24) << "contacts were few in between";
+}
+
 struct Case {
   const char* name;
   double friction;
@@ -228,7 +265,7 @@ TEST_P(ManyContacts, KeepWhatDoesNotChange) {
     step(body, state, to);
     const Scratch& scratch = state.scratch;
     largest = std::max(largest, state.tools.front().contact_wrench.force.norm());
-    if (!scratch.problem.many) continue;
+    if (!scratch.problem.single) continue;
     if (tick > 150)
       shares.push_back(static_cast<double>(scratch.assembly.compliance.renewed()) /
                        static_cast<double>(scratch.problem.rows));
@@ -255,7 +292,7 @@ TEST_P(ManyContacts, ForeseeTheirForces) {
   for (int tick = 0; tick < 500; ++tick) {
     step(cube(), state, poses(tick));
     const ContactProblem& problem = state.scratch.problem;
-    if (!problem.many || tick < 50) continue;
+    if (!problem.single || tick < 50) continue;
     const auto of_rows = [&](const std::vector<double>& values) {
       return Eigen::Map<const Eigen::VectorXd>(values.data(), problem.rows);
     };
@@ -278,7 +315,7 @@ std::pair<Index, bool> slide_far(double radius) {
   hold(cube(), state, pose(pressed), 20);
   const std::vector<ContactPoint> before(state.contacts().begin(), state.contacts().end());
   step(cube(), state, pose(pressed + Vec3(0.1, 0.0, -0.02)));
-  EXPECT_TRUE(state.scratch.problem.many);
+  EXPECT_TRUE(state.scratch.problem.single);
   const auto last =
       std::span(state.scratch.last.contacts).first(static_cast<std::size_t>(state.scratch.last.count));
   const bool same = std::equal(before.begin(), before.end(), last.begin(), last.end(),
