@@ -40,8 +40,8 @@ Model describe_model(const Description& description, const BakeOptions& options,
   return model;
 }
 
-ElasticBody elastic_body(const MeshedModel& meshed) {
-  ElasticBody body = elastic_body(meshed.model);
+StiffnessInput stiffness_input(const MeshedModel& meshed) {
+  StiffnessInput body = stiffness_input(meshed.model);
   body.prescribed = meshed.prescribed;
   return body;
 }
@@ -72,7 +72,7 @@ MeshedModel mesh_model(const BakeRun& run) {
 }
 
 AssembledBody::AssembledBody(const BakeRun& run, const MeshedModel& meshed)
-    : elastic(elastic_body(meshed)),
+    : elastic(stiffness_input(meshed)),
       stiffness(assemble_stiffness(elastic)),
       factor(analyse(run, stiffness)),
       stored(stored_dof_marks(meshed.model.mesh, meshed.surface, stiffness, run.description.scope,

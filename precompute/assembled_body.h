@@ -37,7 +37,7 @@ struct StoredNumbering {
 struct AssembledBody {
   AssembledBody(const BakeRun& run, const MeshedModel& meshed);
 
-  ElasticBody elastic;
+  StiffnessInput elastic;
   Stiffness stiffness;
   std::unique_ptr<Factor> factor;
   std::vector<std::uint8_t> stored;  ///< [n] whether a dof of K is

@@ -236,7 +236,7 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
     return report;
   }
   take_blas_room(1);
-  const Stiffness stiffness = assemble_stiffness(elastic_body(model));
+  const Stiffness stiffness = assemble_stiffness(stiffness_input(model));
   Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();
   const std::vector<std::int64_t> stored_dofs = stored_dofs_of(model, stiffness);

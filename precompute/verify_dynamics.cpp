@@ -128,7 +128,7 @@ std::vector<Check> check_modes(const Model& model, const Stiffness& stiffness, c
 }  // namespace
 
 std::vector<Check> verify_dynamics(const Model& model, const Stiffness& stiffness, int samples) {
-  const SparseMatrix M = assemble_mass(elastic_body(model), stiffness, model.dynamics.lumped);
+  const SparseMatrix M = assemble_mass(stiffness_input(model), stiffness, model.dynamics.lumped);
   if (model.dynamics.method == DynamicsMethod::modal) return check_modes(model, stiffness, M);
   std::vector<Check> checks = check_matrices(model, stiffness, M);
   const std::vector<Check> inverse = check_inverse(model, stiffness, M, samples);

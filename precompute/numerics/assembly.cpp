@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t max_element_dofs = std::size_t{3} * max_element_nodes;
 
 /// Numbers the free dofs, keeping those of a node together.
-void number_dofs(const ElasticBody& body, Stiffness& result) {
+void number_dofs(const StiffnessInput& body, Stiffness& result) {
   const int d = body.mesh.dimension();
   result.free_of_dof.assign(static_cast<std::size_t>(d) * body.mesh.nodes.size(), -1);
   for (std::size_t node = 0; node < body.mesh.nodes.size(); ++node) {
@@ -33,7 +33,7 @@ struct UpperNeighbours {
 };
 
 /// Free node of each mesh node, -1 if all its dofs are held.
-std::vector<Index> free_nodes(const ElasticBody& body, const Stiffness& stiffness) {
+std::vector<Index> free_nodes(const StiffnessInput& body, const Stiffness& stiffness) {
   std::vector<Index> result(body.mesh.nodes.size(), -1);
   for (std::size_t a = 0; a + 1 < stiffness.node_start.size(); ++a) {
     const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(stiffness.node_start[a])];
@@ -103,7 +103,7 @@ SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::i
 
 /// Adds K_e: entries between free dofs to K, those between free and held dofs times the prescribed
 /// displacement to the held force.
-void scatter(const ElasticBody& body, std::span<const Index> nodes, const ElementMatrix& Ke,
+void scatter(const StiffnessInput& body, std::span<const Index> nodes, const ElementMatrix& Ke,
              Stiffness& result) {
   const int d = body.mesh.dimension();
   std::array<std::int64_t, max_element_dofs> free{};
@@ -136,12 +136,12 @@ void scatter(const ElasticBody& body, std::span<const Index> nodes, const Elemen
 
 }  // namespace
 
-ElasticBody elastic_body(const Model& model) {
+StiffnessInput stiffness_input(const Model& model) {
   return {model.mesh,  model.analysis,         model.thickness, model.materials, model.material_of_element,
           model.fixed, model.rest_displacement};
 }
 
-Stiffness assemble_stiffness(const ElasticBody& body) {
+Stiffness assemble_stiffness(const StiffnessInput& body) {
   Stiffness result;
   number_dofs(body, result);
   result.held_force.assign(result.free_dofs.size(), 0.0);
@@ -160,7 +160,7 @@ Stiffness assemble_stiffness(const ElasticBody& body) {
   return result;
 }
 
-SparseMatrix assemble_mass(const ElasticBody& body, const Stiffness& stiffness, bool lumped) {
+SparseMatrix assemble_mass(const StiffnessInput& body, const Stiffness& stiffness, bool lumped) {
   const int d = body.mesh.dimension();
   SparseMatrix M = stiffness.K;
   std::fill_n(M.valuePtr(), M.nonZeros(), 0.0);

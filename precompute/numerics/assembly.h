@@ -23,7 +23,7 @@ struct Stiffness {
 };
 
 /// Data from which K is assembled. `prescribed` [N] may be empty: all held dofs stay at zero.
-struct ElasticBody {
+struct StiffnessInput {
   const Mesh& mesh;
   Analysis analysis;
   double thickness;
@@ -33,15 +33,15 @@ struct ElasticBody {
   std::span<const Vec3> prescribed;
 };
 
-/// ElasticBody of a baked model.
-ElasticBody elastic_body(const Model& model);
+/// StiffnessInput of a baked model.
+StiffnessInput stiffness_input(const Model& model);
 
 /// K = sum over elements of the integral of t B^T D B (theory.md section 1). At least one dof must be free.
-Stiffness assemble_stiffness(const ElasticBody& body);
+Stiffness assemble_stiffness(const StiffnessInput& body);
 
 /// M = sum over elements of the integral of t density N^T N [kg], of the free dofs, in K's pattern, the lower
 /// triangle; consistent or `lumped`.
-SparseMatrix assemble_mass(const ElasticBody& body, const Stiffness& stiffness, bool lumped);
+SparseMatrix assemble_mass(const StiffnessInput& body, const Stiffness& stiffness, bool lumped);
 
 /// K_bar = K + a0 M + a1 C_d (theory.md section 5), in the same pattern.
 SparseMatrix effective_stiffness(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,

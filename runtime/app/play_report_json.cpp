@@ -95,8 +95,6 @@ Json json_live(const Body& body, const LiveTelling& live, const LoopReport& repo
       {"steps_with_inverted_elements", counts.inverted},
       {"most_inverted", counts.most_inverted},
       {"plastic_work_J", counts.plastic_work},
-      {"longest_stable_step_s", std::isfinite(live.step_limit) ? Json(live.step_limit) : Json(nullptr)},
-      {"steps_near_limit", counts.near_limit},
       {"compliance_age_s", live.compliance_age},
       {"compliance_renewals", live.renewals},
       {"compliance_turns", live.turns},

@@ -53,9 +53,8 @@ void PageConnection::leave() {
 }
 
 void PageConnection::open_socket() {
-  const Request& request = parser_->get();
-  only_watches_ = palpate::only_watches(request);
-  const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
+  only_watches_ = palpate::only_watches(request());
+  const bool offers = request().count(http::field::sec_websocket_protocol) > 0;
   stream_.expires_never();  // the WebSocket has timeouts of its own
   socket_.emplace(std::move(stream_));
   websocket::stream_base::timeout times{};

@@ -174,7 +174,7 @@ void time_ticks(benchmark::State& run, const Body& body, const Motion& motion) {
 class SparseCompliance {
  public:
   explicit SparseCompliance(const Body& body)
-      : stiffness_(assemble_stiffness(elastic_body(body.model()))),
+      : stiffness_(assemble_stiffness(stiffness_input(body.model()))),
         factor_(stiffness_.K, stiffness_.node_start) {
     factor_.factorize();
   }

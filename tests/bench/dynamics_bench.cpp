@@ -169,10 +169,10 @@ struct Matrices {
   Rayleigh damping;
   Newmark newmark;
 
-  explicit Matrices(const Model& model) : stiffness(assemble_stiffness(elastic_body(model))) {
+  explicit Matrices(const Model& model) : stiffness(assemble_stiffness(stiffness_input(model))) {
     constexpr double hertz = 2.0 * M_PI;
     damping = rayleigh_damping(2.0 * hertz, 0.05, 20.0 * hertz, 0.05);
-    M = assemble_mass(elastic_body(model), stiffness, false);
+    M = assemble_mass(stiffness_input(model), stiffness, false);
     K_bar = effective_stiffness(stiffness.K, M, damping, newmark);
   }
 };

@@ -76,7 +76,7 @@ PackedGreens solve_all(const Factor& factor, std::span<const std::int64_t> dofs)
   return {std::shared_ptr<const void>(packed, packed.get()), n, Precision::single_precision};
 }
 
-Forms make_forms(const ElasticBody& body, const Surface& surface) {
+Forms make_forms(const StiffnessInput& body, const Surface& surface) {
   const Stiffness stiffness = assemble_stiffness(body);
   Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();

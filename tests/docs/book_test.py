@@ -84,11 +84,11 @@ class Features(unittest.TestCase):
 
     def test_what_is_new_or_gone_is_noticed(self):
         has = features()
-        self.assertIn("newmark", has["--integrator"])
-        has["--integrator"] = has["--integrator"] - {"newmark"} | {"rk8"}
+        self.assertIn("midpoint", has["--integrator"])
+        has["--integrator"] = has["--integrator"] - {"midpoint"} | {"rk8"}
         self.assertEqual(list(book.stale_features(book.SOURCE, has)),
                          [f"{page}: {first}: {what}" for page, first in (("docs/comparison.md", "their integrators"), ("docs/live.md", "`--integrator`"))
-                          for what in ("newmark is in no program", "rk8 is not told")])
+                          for what in ("midpoint is in no program", "rk8 is not told")])
 
 
 class Rules(unittest.TestCase):

@@ -95,7 +95,7 @@ class Pages(unittest.TestCase):
         members = re.findall(r"^  [^/\n]* = [^\n]*;|^  [^/\n]* =\n", header, re.MULTILINE)
         self.assertGreater(len(members), 90)
         self.assertEqual(len(rows(page("tuning"))), len(members))
-        self.assertIn("| `same_place` | 1e-4 | edge | contact points nearer than this are one |", page("tuning"))
+        self.assertIn("| `same_place` | 1e-4 | edge | contact points closer than this are one |", page("tuning"))
 
     def test_each_exit_status_has_a_row(self):
         self.assertEqual([row[0] for row in rows(page("exit-statuses"))], ["0", "1", "2", "3", "130"])

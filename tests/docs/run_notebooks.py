@@ -34,7 +34,7 @@ def run(page, build, say=print):
         folder = pathlib.Path(folder)
         notebook = nbformat.reads(json.dumps(notebooks.notebook(page, folder)), as_version=4)
         nbformat.validate(notebook)
-        client = nbclient.NotebookClient(notebook, timeout=240, kernel_name="python3", resources={"metadata": {"path": str(folder)}})
+        client = nbclient.NotebookClient(notebook, timeout=240, startup_timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}})
         try:
             client.execute()
         except nbclient.exceptions.CellExecutionError as failed:

@@ -60,7 +60,7 @@ class Baked : public testing::Test, public test::BakedBody {};
 class Reactions {
  public:
   explicit Reactions(const Model& model)
-      : model_(model), stiffness_(assemble_stiffness(elastic_body(model))) {
+      : model_(model), stiffness_(assemble_stiffness(stiffness_input(model))) {
     K_ = stiffness_.K.selfadjointView<Eigen::Lower>();
   }
 

@@ -117,7 +117,7 @@ void prepare(const Options& options, Problem& problem) {
   model.fixed = meshed.fixed;
   model.mesh = meshed.mesh;
   model.surface = surface_simplices(meshed.surface);
-  ElasticBody body = elastic_body(model);
+  StiffnessInput body = stiffness_input(model);
   body.prescribed = meshed.prescribed;
   problem.stiffness = assemble_stiffness(body);
   fmt::print("mesh and K: {} nodes, {} dofs: {}\n", model.mesh.nodes.size(), problem.stiffness.K.rows(),

@@ -71,13 +71,13 @@ double measured_rate(const GreensSolver& solver, const std::vector<Tile>& tiles,
 void run(const std::string& file, std::int64_t samples) {
   const Description description = read_description(file);
   MeshedBody body = mesh_body(description, [](const std::string&) {});
-  ElasticBody elastic{.mesh = body.mesh,
-                      .analysis = description.analysis,
-                      .thickness = description.thickness,
-                      .materials = {&description.materials.at(0).material, 1},
-                      .material_of_element = body.material_of_element,
-                      .fixed = body.fixed,
-                      .prescribed = body.prescribed};
+  StiffnessInput elastic{.mesh = body.mesh,
+                         .analysis = description.analysis,
+                         .thickness = description.thickness,
+                         .materials = {&description.materials.at(0).material, 1},
+                         .material_of_element = body.material_of_element,
+                         .fixed = body.fixed,
+                         .prescribed = body.prescribed};
   const Stiffness stiffness = assemble_stiffness(elastic);
   openblas_set_num_threads(1);
   Factor factor(stiffness.K, stiffness.node_start);

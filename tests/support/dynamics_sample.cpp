@@ -32,7 +32,7 @@ DynamicsOptions packed() {
 }
 
 SparseRoute::SparseRoute(const Model& model) : newmark(model.dynamics.newmark) {
-  const ElasticBody elastic = elastic_body(model);
+  const StiffnessInput elastic = stiffness_input(model);
   const Stiffness stiffness = assemble_stiffness(elastic);
   equation.K = stiffness.K;
   equation.M = assemble_mass(elastic, stiffness, model.dynamics.lumped);

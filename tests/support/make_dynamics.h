@@ -28,7 +28,7 @@ std::shared_ptr<const void> packed_inverse(const Factor& K_bar, std::span<const 
 /// All of it, of a model that has mesh, materials, held nodes, scope and stored nodes; K_bar^-1 in the given
 /// precision.
 inline StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options, Precision precision) {
-  const ElasticBody body = elastic_body(model);
+  const StiffnessInput body = stiffness_input(model);
   const Stiffness stiffness = assemble_stiffness(body);
   const SparseMatrix M = assemble_mass(body, stiffness, options.lumped);
   const std::vector<std::int64_t> stored_dofs = stored_dofs_of(model, stiffness);

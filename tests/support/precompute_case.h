@@ -8,7 +8,7 @@
 
 namespace palpate::test {
 
-/// Owns what an ElasticBody refers to: one material everywhere and nothing held until told otherwise.
+/// Owns what an StiffnessInput refers to: one material everywhere and nothing held until told otherwise.
 struct ElasticCase {
   Mesh mesh;
   std::vector<Material> materials;
@@ -35,7 +35,7 @@ struct ElasticCase {
     return *this;
   }
 
-  [[nodiscard]] ElasticBody body() const {
+  [[nodiscard]] StiffnessInput body() const {
     return {mesh, analysis, thickness, materials, material_of_element, fixed, prescribed};
   }
 };

@@ -368,9 +368,9 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
     held_.fade = 0.0;
     sampled_.held_in_flight = false;
   }
-  sample_step_ = sample.step;
-  sample_phase_ = phase_ % ticks_per_step_;
-  share_ = 0.0;
+  sampled_.step = sample.step;
+  sampled_.phase = phase_ % ticks_per_step_;
+  sampled_.share = 0.0;
   return true;
 }
 

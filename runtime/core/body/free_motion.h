@@ -117,9 +117,9 @@ class FreeMotion {
   /// Adds sign * u [n] to the motion until the next sample, to compensate a change of the displacement by
   /// contact forces when their compliance changes. Call after `receive`.
   void take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept;
-  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< last sample's
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }  ///< last sample's
   /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.
-  [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
+  [[nodiscard]] bool is_late() const noexcept { return ends_step() && sampled_.job.step > sampled_.step; }
 
  private:
   [[nodiscard]] Vec3 find_at(const ElasticBody& body, Index surface_node) noexcept;
@@ -153,8 +153,7 @@ class FreeMotion {
   /// Samples of a step beside the tick.
   struct Sampled {
     MotionJob job;
-    std::int64_t step = 0;  // of the last sample
-    bool is_near_limit = false;
+    std::int64_t step = 0;          // of the last sample
     bool held_in_flight = false;    // what is held stays until a sample has it
     std::int64_t phase = 0;         // in which the sample came
     std::vector<double> before, u;  // [n] samples between which the tick lies
@@ -174,38 +173,12 @@ class FreeMotion {
   bool dynamic_contact_;
   bool active_;
   std::int64_t ticks_ = 0;
-  std::int64_t phase_ = 1;        // tick within the present step, from 1; the last one ends it
-  std::vector<NodalLoad> loads_;  // [history] loads of the last ticks, cyclic
-  std::vector<double> strains_;   // [history] strain energies under them [J]
-  double returned_ = 0.0;         // strain energy released by the body recently [J]
-  LetGo pending_;                 // release not yet in the motion
-
-  // Displacement held fixed: until it enters the motion, and for modal dynamics the part not represented by
-  // modes.
-  std::vector<double> held_;          // [n] factor fade_
-  std::vector<double> pending_held_;  // [n]
-  double fade_ = 0.0;
-  double since_let_go_ = 0.0;  // [s]
-
-  // Modal.
-  std::optional<ModalNewmark> modal_;
-  std::vector<double> q_before_;  // [k] at the beginning of the step
-  std::vector<double> q_held_;    // [k] modal part of held_
-  std::vector<double> shown_;     // [k] modal coordinates of the displayed motion, without held_
-  std::vector<double> g_, rate_;  // [k] workspace
-
-  // Packed.
-  MotionJob job_;
-  std::int64_t sample_step_ = 0;
-  bool held_in_flight_ = false;       // held_ is in a job and not yet in a sample
-  std::int64_t sample_phase_ = 0;     // phase at which the sample arrived
-  std::vector<double> u_before_, u_;  // [n] samples between which the tick lies
-  double share_ = 1.0;                // weight of u_
-  std::vector<double> untouched_;     // [n] empty unless live
-
-  // Per surface node.
-  std::vector<std::int64_t> stamp_;  // tick of the value
-  std::vector<Vec3> value_, change_;
+  std::int64_t phase_ = 1;  // tick within the present step, from 1; the last one ends it
+  History history_;
+  Held held_;
+  Modal modal_;
+  Sampled sampled_;
+  std::vector<SurfaceNode> nodes_;  // [S]
 };
 
 }  // namespace palpate

@@ -13,10 +13,8 @@ Index padded(Index rows) noexcept {
 /// Three numbers of a node, and a fourth one that is ignored.
 using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
 
-Four read(const double* numbers) noexcept {
-  Four four;
+void read(const double* numbers, Four& four) noexcept {
   std::memcpy(&four, numbers, sizeof(four));
-  return four;
 }
 
 }  // namespace
@@ -62,15 +60,23 @@ void BodyCompliance::fill_between_nodes(const NearField& near, std::span<const C
       for (int axis = 0; axis < D; ++axis) c[axis] = near.row(nodes[loads_[by].dof].dof + axis).data();
       for (Index a = loads_[begin].dof; a < node_count; ++a) {
         Four u{};
-        if (by > begin) u = read(nodes[a].force.data());
-        for (std::size_t axis = 0; axis < D; ++axis) u += f[axis] * read(c[axis] + nodes[a].dof);
+        if (by > begin) read(nodes[a].force.data(), u);
+        for (std::size_t axis = 0; axis < D; ++axis) {
+          Four column;
+          read(c[axis] + nodes[a].dof, column);
+          u += f[axis] * column;
+        }
         std::memcpy(nodes[a].force.data(), &u, sizeof(u));
       }
     }
     for (std::size_t i = j; i < rows.size(); ++i) {
       Four w{};
-      for (std::size_t at = loads_end_[i]; begin < end && at < loads_end_[i + 1]; ++at)
-        w += read(loads_[at].force.data()) * read(nodes[loads_[at].dof].force.data());
+      for (std::size_t at = loads_end_[i]; begin < end && at < loads_end_[i + 1]; ++at) {
+        Four force, moved;
+        read(loads_[at].force.data(), force);
+        read(nodes[loads_[at].dof].force.data(), moved);
+        w += force * moved;
+      }
       const double sum = D == 3 ? w[0] + w[1] + w[2] : w[0] + w[1];
       W[static_cast<Index>(j)][i] = sum;
       W[static_cast<Index>(i)][j] = sum;

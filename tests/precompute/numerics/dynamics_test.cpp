@@ -154,7 +154,7 @@ TEST_P(DynamicsOfKind, PackedInverseIsThatOfKBar) {
   ASSERT_EQ(dynamics.inverse.order(), model.stored_dofs());
 
   // K + a0 M + a1 C_d from what is stored, the held dofs cut out.
-  const Stiffness stiffness = assemble_stiffness(elastic_body(model));
+  const Stiffness stiffness = assemble_stiffness(stiffness_input(model));
   const std::vector<std::int64_t> dofs = stored_dofs_of(model, stiffness);
   const MatrixXd K = dense(stiffness.K);
   std::vector<std::int64_t> free;

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "runtime/body/packed_newmark.h"
 #include "runtime/core/body/greens.h"
 #include "runtime/core/body/modal_newmark.h"
-#include "runtime/body/packed_newmark.h"
 #include "tests/support/dynamics_sample.h"
 
 namespace palpate::dynamics_newmark_test {
@@ -146,7 +146,8 @@ TEST_P(NewmarkSteps, PackedUnderForcesIsTheSparseSolve) {
 /// Modal steps of the same release.
 struct ModalRun {
   ModalRun(const Model& model, const LetGoBody& body)
-      : modes(model), newmark(modes.omega(), model.dynamics.damping, model.dynamics.newmark) {
+      : modes(model.dimension(), model.dynamics.omega, model.dynamics.shapes),
+        newmark(modes.omega(), model.dynamics.damping, model.dynamics.newmark) {
     std::vector<Index> nodes;
     for (Index node = 0; node < static_cast<Index>(model.stored_nodes.size()); ++node) nodes.push_back(node);
     std::vector<double> g(static_cast<std::size_t>(modes.count())), rate(g.size());

@@ -115,7 +115,9 @@ INSTANTIATE_TEST_SUITE_P(Elements, Patches,
 
 TEST_P(Patches, AreTheFineMeshExactly) {
   const PatchMesh patch_mesh = mesh();
-  const Patch patch(body_, patch_mesh, condense(body_.model(), patch_mesh));
+  const std::shared_ptr<const Patch> made =
+      make_patch(body_, patch_mesh, condense(body_.model(), patch_mesh));
+  const Patch& patch = *made;
   const auto m = static_cast<Eigen::Index>(patch.surface_nodes().size());
   ASSERT_GT(m, std::ssize(patch.stored_nodes()) / 4);
   ASSERT_TRUE(std::is_sorted(patch.surface_nodes().begin(), patch.surface_nodes().end()));

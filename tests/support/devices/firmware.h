@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/palpate_board.h"
 #include "runtime/devices/reports/pid_layout.h"

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "meshes/mesh.h"
+#include "base/vectors.h"
 
 namespace palpate::bridge_force_test {
 namespace {
