@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "runtime/background/surface_frames.h"
+#include "runtime/core/tick/state.h"
 #include "runtime/loop/recorder.h"
 #include "runtime/loop/settings.h"
-#include "runtime/core/tick/state.h"
 
 namespace palpate {
 

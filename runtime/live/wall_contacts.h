@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "runtime/live/walls.h"
 #include "runtime/core/solve/cone_solver.h"
 #include "runtime/core/solve/contact_problem.h"
+#include "runtime/live/walls.h"
 #include "statics/live_body.h"
 #include "statics/tangent_solver.h"
 

@@ -7,6 +7,7 @@
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
+#include "runtime/core/tick/step.h"
 #include "runtime/loop/loop_report.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/recorder.h"
@@ -15,7 +16,6 @@
 #include "runtime/safety/device.h"
 #include "runtime/safety/safety.h"
 #include "runtime/safety/workspace.h"
-#include "runtime/core/tick/step.h"
 
 namespace palpate {
 

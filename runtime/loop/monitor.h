@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "base/ring.h"
+#include "runtime/core/tick/status.h"
 #include "runtime/loop/histogram.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/core/tick/status.h"
 
 namespace palpate {
 

@@ -5,9 +5,9 @@
 #include <cstdint>
 
 #include "base/error.h"
+#include "runtime/core/tick/status.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/core/tick/status.h"
 
 namespace palpate {
 namespace {

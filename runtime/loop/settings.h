@@ -11,11 +11,11 @@
 #include "base/number_range.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
+#include "runtime/core/touch/tool.h"
 #include "runtime/live/live_settings.h"
 #include "runtime/loop/loading.h"
 #include "runtime/safety/safety_options.h"
 #include "runtime/safety/workspace.h"
-#include "runtime/core/touch/tool.h"
 
 namespace palpate {
 

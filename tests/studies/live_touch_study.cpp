@@ -18,8 +18,8 @@
 
 #include "base/error.h"
 #include "formats/model_file.h"
-#include "runtime/live/live_stepper.h"
 #include "runtime/core/tick/step.h"
+#include "runtime/live/live_stepper.h"
 #include "tests/bench/palpation_paths.h"
 #include "tests/support/study.h"
 

@@ -18,8 +18,8 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "runtime/background/patch_source.h"
-#include "runtime/loop/real_time.h"
 #include "runtime/core/tick/step.h"
+#include "runtime/loop/real_time.h"
 #include "tests/bench/palpation_paths.h"
 
 namespace palpate {

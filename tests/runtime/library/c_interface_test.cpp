@@ -27,9 +27,9 @@
 #include "formats/model_file.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
-#include "runtime/library/palpate.h"
 #include "runtime/core/tick/status.h"
 #include "runtime/core/tick/step.h"
+#include "runtime/library/palpate.h"
 #include "tests/support/folders.h"
 #include "tests/support/meshes_files.h"
 

@@ -19,10 +19,10 @@
 #include "formats/recording_messages.h"
 #include "runtime/background/picture_maker.h"
 #include "runtime/background/surface_frames.h"
+#include "runtime/core/tick/step.h"
 #include "runtime/loop/recorder.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "runtime/core/tick/step.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::session_test {
