@@ -1,7 +1,6 @@
 #include "base/words.h"
 
-#include <array>
-#include <charconv>
+#include "base/number_text.h"
 
 namespace palpate {
 
@@ -20,9 +19,7 @@ std::string shortened(std::string_view text, std::size_t most) {
 }
 
 std::string shown(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return {text.data(), end};
+  return number_text(value);
 }
 
 std::string xml_escaped(std::string_view text) {

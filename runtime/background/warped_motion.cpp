@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <numeric>
+#include <utility>
 
 #include "base/vectors.h"
 
@@ -109,7 +110,7 @@ std::vector<double> WarpedMotion::spread(const MotionJob& job, int axis) const {
 }
 
 void WarpedMotion::turn_compliance(const MotionJob& job) {
-  turned_ = turned(body_.shared_greens(), R_);
+  std::shared_ptr<const Greens> rotated = turned(body_.shared_greens(), R_);
   if (!job.load.empty()) {
     const int d = body_.dimension();
     // Distributed forces, the body's displacement by them, and that by rotated blocks alone.
@@ -125,14 +126,15 @@ void WarpedMotion::turn_compliance(const MotionJob& job) {
       P.col(axis) = column(p);
       balance_.respond_to(p, moved);
       S.col(axis) = column(moved);
-      turned_->displacement(nodes, p, moved);
+      rotated->displacement(nodes, p, moved);
       T.col(axis) = column(moved);
     }
     Eigen::MatrixXd left(P.rows(), 2 * d), right(P.rows(), 2 * d);
     left << S * inverse_of(S.transpose() * P), -T * inverse_of(T.transpose() * P);
     right << S, T;
-    turned_ = turned(body_.shared_greens(), R_, left, right);
+    rotated = turned(body_.shared_greens(), R_, left, right);
   }
+  turned_ = std::move(rotated);
   R_turned_ = R_;
   std::erase_if(kept_, [](const auto& old) { return old.use_count() == 1; });
   kept_.push_back(turned_);

@@ -60,7 +60,6 @@ class NewtonKrylov {
   }
   void load(const ContactProblem& problem, const SymmetricRows& W) noexcept;
   [[nodiscard]] const float* row(Index i) const noexcept { return W_.entries + W_.stride * i; }
-  void set_force(const ContactLaw& contact, const Vec3& force) noexcept;
   void enter_cones() noexcept;
   bool move_by_change() noexcept;
   void find_motion(const ContactProblem& problem) noexcept;
