@@ -254,6 +254,15 @@ TEST(StaleSolution, FadesAfterItsTimeToLiveAndComesBackAsItWent) {
   }
 }
 
+// The thread that writes to the device may begin late.
+TEST(StaleSolution, HasFadedByItsAgeWhenItArrivesOld) {
+  StaleSolution stale({.time_to_live = 10 * ms, .fade = 20 * ms});
+  stale.force(spring(), spring().local.point, Vec3::Zero(), 25 * ms, 0.0);
+  EXPECT_NEAR(stale.share(), 0.25, 1e-12);
+  stale.force(spring(), spring().local.point, Vec3::Zero(), 60 * ms, 0.0);
+  EXPECT_EQ(stale.share(), 0.0);
+}
+
 TEST(StaleSolution, ARadiusThatIsNoneIsZero) {
   for (const double radius : {nan, -1.0, 0.0}) {
     DeviceCommand solution = spring();
