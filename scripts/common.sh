@@ -57,7 +57,7 @@ build() {
   if [ "$before" != "$(grep '^PALPATE_WERROR:' "$root/build/$preset/CMakeCache.txt")" ]; then
     find "$root/build/$preset" -name '*.gch' -delete
   fi
-  cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
+  nice cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
 }
 
 # The segmented CT liver that Debian's libcgal-demo brings, put beside its model.toml.

@@ -11,7 +11,6 @@ from programs import SOURCE
 OUTSIDE = f"""cmake_minimum_required(VERSION 3.25)
 project(outside C CXX)
 set(PALPATE_TESTS OFF)
-set(PALPATE_WEB OFF)
 add_subdirectory("{SOURCE}" palpate)
 """
 FLAGS = {"-Werror", "-march=native"}
@@ -41,16 +40,16 @@ class BuildFlags(unittest.TestCase):
     def test_presets_are_for_this_processor_and_those_of_tests_refuse_warnings(self):
         for preset, flags in (("release", {"-march=native"}), ("asan", FLAGS)):
             with self.subTest(preset):
-                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF"), flags)
+                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DCMAKE_UNITY_BUILD=OFF"), flags)
 
     def test_programs_are_built_without_what_tests_need(self):
-        self.flags_of_c_interface("--preset", "release", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON")
+        self.flags_of_c_interface("--preset", "release", "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON")
         self.assertIn("Without tests, as these are missing: GTest. scripts/test installs them.", self.configured.stdout)
         self.assertNotIn("step_test.cpp", (self.folder / "build" / "compile_commands.json").read_text())
 
     def test_what_the_demo_goes_without_is_built_once_it_is_there(self):
         for missing in ("ON", "OFF"):
-            self.flags_of_c_interface("--preset", "release", "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF", f"-DCMAKE_DISABLE_FIND_PACKAGE_MPI={missing}")
+            self.flags_of_c_interface("--preset", "release", "-DPALPATE_TESTS=OFF", "-DCMAKE_UNITY_BUILD=OFF", f"-DCMAKE_DISABLE_FIND_PACKAGE_MPI={missing}")
             self.assertEqual("rank_commands.cpp" in (self.folder / "build" / "compile_commands.json").read_text(), missing == "OFF")
 
 

@@ -9,7 +9,7 @@ import numpy
 from programs import PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, run
 
 MODELS = SOURCE / "meshes" / "models"
-CHEAP = ("cube", "beam", "sphere", "plate", "cantilever")
+CHEAP = ("cube", "ball", "beam", "sphere", "plate", "cantilever")
 TOO_LARGE = {"liver_ct"}  # for one machine
 
 
@@ -53,6 +53,18 @@ class Cheap(ModelsTest):
         for name in CHEAP:
             with self.subTest(model=name):
                 self.expect_whole(name)
+
+
+class Kept(ModelsTest):
+    def test_the_body_that_is_kept_baked_is_what_its_model_bakes(self):
+        kept = MODELS / "ball" / "ball.palpate.hdf"
+        self.expect_no_warning(run(PRECOMPUTE, "verify", kept))
+        file = self.folder / "ball.palpate.hdf"
+        self.expect_no_warning(run(PRECOMPUTE, MODELS / "ball" / "model.toml", "-o", file))
+        with h5py.File(kept) as old, h5py.File(file) as new:
+            numpy.testing.assert_array_equal(old["/mesh/nodes"], new["/mesh/nodes"])
+            greens = old["/greens/packed"][:]
+            numpy.testing.assert_allclose(greens, new["/greens/packed"], rtol=0, atol=1e-6 * numpy.abs(greens).max())
 
 
 class Dear(ModelsTest):
