@@ -37,7 +37,7 @@ html_permalinks_icon = "#"
 
 # Chapters in the order of the sidebar. A page that stands nowhere here is a warning of Sphinx, and so an error.
 CHAPTERS = {
-    "First steps": ["getting-started", "faq", "limits"],
+    "First steps": ["getting-started", "samples", "faq", "limits"],
     "Tutorials": [
         "tutorials/push-a-liver",
         "tutorials/your-own-stl",

@@ -23,6 +23,7 @@
 #include "runtime/app/view.h"
 #include "runtime/loop/numbers.h"
 #include "runtime/push/push_command.h"
+#include "runtime/push/samples_command.h"
 #include "runtime/push/solved_settings.h"
 #include "runtime/safety/safety_options.h"
 
@@ -217,7 +218,7 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
   return places;
 }
 
-constexpr std::string_view commands = "push, play, view, probe, session, export or devices";
+constexpr std::string_view commands = "push, play, view, probe, session, export, devices or samples";
 
 /// Returns a hint at the intended command if the first word is not one; otherwise empty.
 std::string meant_by(const CLI::App& app, const std::string& word) {
@@ -235,7 +236,8 @@ std::string meant_by(const CLI::App& app, const std::string& word) {
       return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", shell_word(word),
                          see);
   }
-  const auto command = meant(word, {"push", "probe", "play", "view", "export", "session", "devices", "help"});
+  const auto command =
+      meant(word, {"push", "probe", "play", "view", "export", "session", "devices", "samples", "help"});
   return command ? "Did you mean palpate-runtime " + *command + "? " + see
                  : fmt::format("Commands are {}. {}", commands, see);
 }
@@ -301,6 +303,7 @@ int run(int argc, char** argv) {
       "  palpate-runtime push organ.stl                  make a body of a surface and push it in a browser\n"
       "  palpate-runtime play cube.palpate.hdf --view    push a precomputed one\n"
       "  palpate-runtime view                            choose from what this folder has\n"
+      "  palpate-runtime samples                         small programs to begin with\n"
       "  palpate-runtime help play                       more about a command\n"
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
   Arguments arguments;
@@ -312,6 +315,7 @@ int run(int argc, char** argv) {
   const CLI::App* session_command = add_session(app, arguments);
   const CLI::App* export_command = add_export(app, arguments.exported);
   const CLI::App* devices_command = add_devices(app, arguments);
+  const CLI::App* samples_command = add_samples(app);
   const CLI::App* help_command = add_help_command(app, arguments.help);
   if (asks_for_json(argc, argv)) return print_help_json(app, number_tables());
   const std::string first_word = argc > 1 ? argv[1] : "";
@@ -326,6 +330,7 @@ int run(int argc, char** argv) {
       return exit_ok;
     }
     if (devices_command->parsed()) return devices(arguments.devices);
+    if (samples_command->parsed()) return show_samples();
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.finish);
     if (view_command->parsed()) return view(arguments.recordings, read_viewer(arguments.viewer));
     if (export_command->parsed()) return export_session(arguments.exported);

@@ -566,7 +566,7 @@ class FullDisk(OutputTest):
         commands = [("--help",), ("--version",), ("session", "t.mcap"), ("session", "t.mcap", "--json"), ("devices",), ("devices", "--json"),
                     ("devices", "--print-profile", "spacemouse"),
                     ("play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", "--report", "-")]
-        commands += [(command, "--help") for command in ("probe", "play", "view", "export", "session", "devices")]
+        commands += [(command, "--help") for command in ("probe", "play", "view", "export", "session", "devices", "samples")]
         commands += [("probe", "cube.palpate.hdf", "--at", "0.5,0.5,1", "--displace", "0,0,-0.1", *json_flag) for json_flag in ((), ("--json",))]
         for arguments in commands:
             with self.subTest(arguments=arguments):
