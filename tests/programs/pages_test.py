@@ -123,7 +123,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
     def test_bash_offers_commands_files_and_values(self):
         for line, wanted in (
                 ("palpate-runtime pl", ["play"]), ("palpate-runtime ", ["devices", "export", "help", "play", "probe", "push", "samples", "session", "view"]),
-                ("palpate-runtime help s", ["session"]), ("palpate-runtime play ", ["cube.palpate.hdf", "deep"]),
+                ("palpate-runtime help s", ["samples", "session"]), ("palpate-runtime play ", ["cube.palpate.hdf", "deep"]),
                 ("palpate-precompute --element ", ["tet10", "tet4"]),
                 ("palpate-runtime play --contact ", ["dynamic", "quasi-static"]), ("palpate-runtime play --contact=d", ["dynamic"]),
                 ("palpate-runtime play --tool ", ["capsule:", "disc:", "point", "sphere:"]), ("palpate-runtime play --tool=s", ["sphere:"]),

@@ -400,7 +400,7 @@ class Page(ProgramTest):
         alone = self.folder / "bin" / "palpate-runtime"
         alone.parent.mkdir()
         shutil.copy(RUNTIME, alone)
-        self.assert_refused(run(alone, "samples"), str(self.folder / "share/palpate/samples.html"), "install Palpate whole")
+        self.assert_refused(run(alone, "samples"), str(self.folder / "share/palpate/samples.html"), "Install Palpate whole")
 
     def test_python_copies_and_runs_one(self):
         def of_python(*words):

@@ -108,7 +108,7 @@ class Usage(ProgramTest):
         for word, piece in (("liver.palpate.hdf", "palpate-runtime play liver.palpate.hdf --view"),
                             ("touch.mcap", "palpate-runtime view touch.mcap"), ("model.toml", "palpate-precompute model.toml"),
                             ("pley", "palpate-runtime play?"), ("plya", "palpate-runtime play?"), ("sesion", "palpate-runtime session?"),
-                            ("bogus", "play, view, probe, session, export or devices")):
+                            ("bogus", "play, view, probe, session, export, devices or samples")):
             with self.subTest(word=word):
                 self.assert_usage(run(RUNTIME, word), f"'{word}'", piece)
 
