@@ -746,7 +746,7 @@ class Usage(ProgramTest):
 
     def test_wrong_arguments(self):
         place = ("--at", "0,0,1", "--displace", "0,0,1")
-        self.assert_usage("play, view, probe, session, export or devices is required")
+        self.assert_usage("play, view, probe, session, export, devices or samples is required")
         self.assert_usage("bogus", "bogus")
         self.assert_usage("FILE", "probe", *place)
         self.assert_usage("--bogus", "probe", "x.palpate.hdf", *place, "--bogus")
