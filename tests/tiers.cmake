@@ -31,7 +31,6 @@ set(palpate_dear
   programs_bindings_test.Clients                 test_feel_the_same_to_the_last_bit
   programs_library_test.Library                  test_found_by_cmake,test_header_is_c99_and_cpp
   book_run_notebooks_test.Kernel                 -
-  programs_wheel_test.Wheel                      test_a_folder_without_a_build_is_refused
   # Devices that stall, by the clock.
   devices_faults_test.All/Faults                 StayWithinTheClamps/read_error,StayWithinTheClamps/garbage
   devices_play_test                              ABoardIsFeltAsTheSessionSays,KilledInContactItLeavesNoForce

@@ -5,7 +5,6 @@
 #include <linux/filter.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -15,6 +14,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+
+#include "base/limits/descriptors.h"
 
 namespace palpate {
 namespace {
@@ -107,19 +108,6 @@ constexpr sock_filter only_if(std::uint32_t value, std::uint8_t skipped) {
 constexpr sock_filter allow = statement(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
 constexpr sock_filter refuse = statement(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM);
 
-/// Closes the descriptors [first, last].
-void close_all(int first, int last) {
-  if (first > last) return;
-#ifdef __NR_close_range
-  if (::syscall(__NR_close_range, first, last, 0) == 0) return;
-#endif
-  rlimit limit{};
-  constexpr rlim_t most = 1 << 16;  // on kernels before 5.9
-  ::getrlimit(RLIMIT_NOFILE, &limit);
-  for (int fd = first; fd <= last && static_cast<rlim_t>(fd) < std::min(limit.rlim_cur, most); ++fd)
-    ::close(fd);
-}
-
 void close_all_but(std::span<const int> kept) {
   int first = STDERR_FILENO + 1;
   for (;;) {
@@ -127,10 +115,10 @@ void close_all_but(std::span<const int> kept) {
     for (const int fd : kept)
       if (fd >= first && (next < 0 || fd < next)) next = fd;
     if (next < 0) break;
-    close_all(first, next - 1);
+    close_descriptors(first, next - 1);
     first = next + 1;
   }
-  close_all(first, std::numeric_limits<int>::max());
+  close_descriptors(first, std::numeric_limits<int>::max());
 }
 
 }  // namespace

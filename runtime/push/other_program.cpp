@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <climits>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -15,6 +16,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/limits/descriptors.h"
 
 namespace palpate {
 namespace {
@@ -71,7 +73,7 @@ std::array<int, 2> make_pipe(const std::filesystem::path& program) {
   dup2(output, start.read == OtherProgram::Stream::output ? STDOUT_FILENO : STDERR_FILENO);
   if (told == told_descriptor) fcntl(told, F_SETFD, 0);
   if (told >= 0) dup2(told, told_descriptor);
-  if (told >= 0) ::close_range(told_descriptor + 1, ~0U, 0);  // including sockets of a server
+  if (told >= 0) close_descriptors(told_descriptor + 1, INT_MAX);  // including sockets of a server
   if (!start.has_terminal) {
     setpgid(0, 0);
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/limits/descriptors.h"
 
 namespace palpate {
 namespace {
@@ -75,7 +76,7 @@ void detach(int& pipe) noexcept {
     }
   }
   if (pipe != own) pipe = dup2(pipe, own);
-  close_range(own + 1, UINT_MAX, 0);
+  close_descriptors(own + 1, INT_MAX);
   static_cast<void>(!chdir("/"));
 }
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
-from numpy.typing import NDArray
 
 from .cdr import HEAD, BadMessage, Layout
-from .library import Array, Error, path_bytes
+from .library import Error, path_bytes
 from .mcap import McapFile
+
+if TYPE_CHECKING:  # numpy has it from 1.20 on
+    from numpy.typing import NDArray
+
+    from .library import Array
 
 _BODY = "a file of palpate-precompute, NAME.palpate.hdf"
 _RECORDING = "name a recording of palpate-runtime play --record"

@@ -8,14 +8,18 @@ import os
 import pathlib
 import subprocess
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy
-from numpy.typing import ArrayLike
 
-from .library import Array, Error, path_text, program
+from .library import Error, path_text, program
 
-Path = str | os.PathLike[str]
+if TYPE_CHECKING:  # numpy has it from 1.20 on
+    from numpy.typing import ArrayLike
+
+    from .library import Array
+
+Path = Union[str, "os.PathLike[str]"]  # as CPython 3.9 takes it
 
 
 def bake(model: Path, output: Path, *, jobs: int | None = None, force: bool = False,

@@ -8,13 +8,17 @@ import math
 import operator
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
-from numpy.typing import ArrayLike, NDArray
 
-from .library import (ERROR_STATE, NOT_STEPPED, Array, CContact, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, Numbers,
+from .library import (ERROR_STATE, NOT_STEPPED, CContact, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error,
                       load, path_bytes, whole)
+
+if TYPE_CHECKING:  # numpy has it from 1.20 on
+    from numpy.typing import ArrayLike, NDArray
+
+    from .library import Array, Numbers
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)

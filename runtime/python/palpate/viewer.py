@@ -8,10 +8,11 @@ import os
 import signal
 import subprocess
 import threading
+from typing import Union
 
 from .library import Error, path_text, program
 
-Path = str | os.PathLike[str]
+Path = Union[str, "os.PathLike[str]"]  # as CPython 3.9 takes it
 
 
 class Viewer:
