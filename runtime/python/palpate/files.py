@@ -5,18 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
 
+from .arrays import Array, NDArray
 from .cdr import HEAD, BadMessage, Layout
 from .library import Error, path_bytes
 from .mcap import McapFile
-
-if TYPE_CHECKING:  # numpy has it from 1.20 on
-    from numpy.typing import NDArray
-
-    from .library import Array
 
 _BODY = "a file of palpate-precompute, NAME.palpate.hdf"
 _RECORDING = "name a recording of palpate-runtime play --record"

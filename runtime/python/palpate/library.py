@@ -9,14 +9,7 @@ import pathlib
 import re
 import shutil
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_float, c_int32, c_int64, c_size_t, c_uint32, c_void_p
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # numpy has it from 1.20 on
-    import numpy
-    from numpy.typing import NDArray
-
-    Array = NDArray[numpy.float64]
-    Numbers = NDArray[numpy.int32]
 
 class Error(Exception):
     """What could not be done, and why. `hint`: what to do about it, empty where nothing is known. `code`: of an error of

@@ -5,16 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy
 
+from .arrays import Array, ArrayLike
 from .session import Felt, Session
-
-if TYPE_CHECKING:  # numpy has it from 1.20 on
-    from numpy.typing import ArrayLike
-
-    from .library import Array
 
 
 class Loop:

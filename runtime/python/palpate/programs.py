@@ -8,16 +8,12 @@ import os
 import pathlib
 import subprocess
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Union
+from typing import Any, Union
 
 import numpy
 
+from .arrays import Array, ArrayLike
 from .library import Error, path_text, program
-
-if TYPE_CHECKING:  # numpy has it from 1.20 on
-    from numpy.typing import ArrayLike
-
-    from .library import Array
 
 Path = Union[str, "os.PathLike[str]"]  # as CPython 3.9 takes it
 

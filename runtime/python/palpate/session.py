@@ -8,17 +8,13 @@ import math
 import operator
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy
 
+from .arrays import Array, ArrayLike, NDArray, Numbers
 from .library import (ERROR_STATE, NOT_STEPPED, CContact, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error,
                       load, path_bytes, whole)
-
-if TYPE_CHECKING:  # numpy has it from 1.20 on
-    from numpy.typing import ArrayLike, NDArray
-
-    from .library import Array, Numbers
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)
