@@ -9,6 +9,7 @@ import time
 import tomllib
 import typing
 import unittest
+import unittest.mock
 import urllib.request
 
 import h5py
@@ -495,6 +496,20 @@ class Misuse(PythonTest):
             forces = session.play(path)
             numpy.testing.assert_array_equal(forces, other.play(numpy.column_stack([path, numpy.zeros(200)])))
         self.assertGreater(forces[-1][1], 0)
+
+    def test_an_installed_library_is_the_one_for_this_processor(self):
+        asked = []
+        def refuse(name):
+            asked.append(name)
+            raise OSError
+
+        prefixes = [pathlib.Path("/usr"), pathlib.Path("/opt/palpate")]
+        with unittest.mock.patch("palpate.library.prefixes", return_value=prefixes), \
+                unittest.mock.patch("pathlib.Path.exists", return_value=True), unittest.mock.patch("ctypes.CDLL", refuse), \
+                self.assertRaises(palpate.Error):
+            palpate.library.load()
+        self.assertEqual(asked[0], "libpalpate.so.0", "the loader knows variants (glibc-hwcaps), a path is one of them")
+        self.assertIn("/opt/palpate/lib/libpalpate.so.0", asked)
 
     def test_types_are_those_of_arrays(self):
         self.assertEqual(typing.get_type_hints(palpate.Session.put)["position"], ArrayLike)

@@ -137,7 +137,9 @@ def load() -> ctypes.CDLL:
     """The library, with the types of its functions. Throws Error where it is not found."""
     names = [prefix / folder / "libpalpate.so.0" for prefix in prefixes() for folder in ("lib", "lib64", "runtime")]
     names += [path for prefix in prefixes() for path in sorted(prefix.glob("lib/*/libpalpate.so.0"))]
-    for name in [str(path) for path in names if path.exists()] + ["libpalpate.so.0"]:
+    # Where the loader looks by itself it takes the variant for this processor (glibc-hwcaps).
+    found = ["libpalpate.so.0" if path.is_relative_to("/usr/lib") else str(path) for path in names if path.exists()]
+    for name in [*found, "libpalpate.so.0"]:
         try:
             library = ctypes.CDLL(name)  # its calls let other threads of Python go on
         except OSError:
