@@ -14,7 +14,6 @@ Vec3 StaleSolution::force(const DeviceCommand& solution, const Vec3& position, c
   const bool holds = fresh || (age <= options_.time_to_live && moved.norm() <= radius);
   if (fresh) share_ = std::min(1.0, share_ + elapsed / options_.fade);
   if (!holds) share_ -= elapsed / options_.fade;
-  // A solution that arrives old has faded on its way.
   share_ = std::max(0.0, std::min(share_, 1.0 - (age - options_.time_to_live) / options_.fade));
   const Vec3 force = solution.wrench.force - solution.local.stiffness * clamped(moved, radius);
   return fresh ? force : Vec3(force - options_.damping * velocity);

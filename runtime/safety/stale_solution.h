@@ -21,7 +21,8 @@ class StaleSolution {
 
   /// Returns the force [N] at `position` [m], not yet scaled by share(). b acts only on a solution that is
   /// not current. Beyond the radius the displacement is cut to the radius. `age` [s] and `elapsed` since the
-  /// last call [s] update share().
+  /// last call [s] update share(), which is at most 1 - (age - time_to_live) / fade: a solution that arrives
+  /// old has faded on its way.
   Vec3 force(const DeviceCommand& solution, const Vec3& position, const Vec3& velocity, double age,
              double elapsed) noexcept;
 
