@@ -65,11 +65,23 @@ std::vector<Index> PatchLayers::next_to(const PatchMesh& patch) const {
   return found;
 }
 
-LayeredStiffness::LayeredStiffness(const PatchLayers& layers, Eigen::Index width) {
+void LayeredStiffness::clear(const PatchLayers& layers, Eigen::Index width) {
+  const auto before = [&](int k) { return k > 0 ? layers.size(k - 1) : 0; };
+  Eigen::Index size = 0;
+  for (int k = 0; k < layers.count(); ++k) size += layers.size(k) * (layers.size(k) + before(k) + width);
+  entries_.assign(static_cast<std::size_t>(size), 0.0);
+  diagonal.clear();
+  above.clear();
+  columns.clear();
+  double* next = entries_.data();
+  const auto add = [&](auto& blocks, Eigen::Index rows, Eigen::Index count) {
+    blocks.emplace_back(next, rows, count);
+    next += rows * count;
+  };
   for (int k = 0; k < layers.count(); ++k) {
-    diagonal.push_back(MatrixXd::Zero(layers.size(k), layers.size(k)));
-    above.push_back(MatrixXd::Zero(layers.size(k), k > 0 ? layers.size(k - 1) : 0));
-    columns.push_back(MatrixXd::Zero(layers.size(k), width));
+    add(diagonal, layers.size(k), layers.size(k));
+    add(above, layers.size(k), before(k));
+    add(columns, layers.size(k), width);
   }
 }
 

@@ -35,13 +35,18 @@ class PatchLayers {
   std::vector<Eigen::Index> sizes_;
 };
 
-/// K_L, which is block tridiagonal, and columns beside it, K_LG first.
+/// K_L, which is block tridiagonal, and columns beside it, K_LG first. Its memory serves for patch after
+/// patch.
 struct LayeredStiffness {
-  LayeredStiffness(const PatchLayers& layers, Eigen::Index columns);
+  std::vector<Eigen::Map<Eigen::MatrixXd>> diagonal;  ///< [n_k x n_k] lower triangle
+  std::vector<Eigen::Map<Eigen::MatrixXd>> above;     ///< [n_k x n_(k-1)] to the layer before
+  std::vector<Eigen::Map<Eigen::MatrixXd>> columns;   ///< [n_k x columns]
 
-  std::vector<Eigen::MatrixXd> diagonal;  ///< [n_k x n_k] lower triangle
-  std::vector<Eigen::MatrixXd> above;     ///< [n_k x n_(k-1)] to the layer before
-  std::vector<Eigen::MatrixXd> columns;   ///< [n_k x columns]
+  /// Sets all to zero, with that many columns.
+  void clear(const PatchLayers& layers, Eigen::Index width);
+
+ private:
+  std::vector<double> entries_;
 };
 
 /// Eliminates layer by layer, from the deepest to the surface, and adds C^T K_L^-1 C of the columns C to the

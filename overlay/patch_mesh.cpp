@@ -18,40 +18,6 @@ namespace {
 
 constexpr double no_part = 1e-12;  // value of a shape function that counts as zero
 
-/// A side of a patch element that no other patch element has.
-struct OuterSide {
-  std::size_t number;  // among the element's sides
-  unsigned corners;    // bit k: the element's corner k is on it
-  bool is_border;      // the body goes on behind it; else it is the body's surface
-};
-
-std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
-                                   const std::vector<Index>& patch, Index element) {
-  const ElementTraits& kind = traits(mesh.element);
-  const auto nodes = mesh.element_nodes(element);
-  std::vector<OuterSide> outer;
-  std::size_t number = 0;
-  for (const SideNodes& side : element_sides(mesh.element)) {
-    std::vector<Index> corners;
-    unsigned bits = 0;
-    for (int k = 0; k < traits(kind.facet).corners; ++k) {
-      corners.push_back(nodes[side[k]]);
-      bits |= 1U << side[k];
-    }
-    const auto neighbour = std::find_if(at[corners[0]].begin(), at[corners[0]].end(), [&](Index e) {
-      const auto others = mesh.element_nodes(e);
-      return e != element && std::all_of(corners.begin(), corners.end(), [&](Index corner) {
-               return std::find(others.begin(), others.end(), corner) != others.end();
-             });
-    });
-    const bool is_surface = neighbour == at[corners[0]].end();
-    if (is_surface || !std::binary_search(patch.begin(), patch.end(), *neighbour))
-      outer.push_back({number, bits, !is_surface});
-    ++number;
-  }
-  return outer;
-}
-
 /// Builds a patch's mesh element by element.
 class Builder {
  public:
@@ -196,6 +162,33 @@ std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements) {
   return nodes;
 }
 
+std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> patch,
+                                   Index element) {
+  const ElementTraits& kind = traits(mesh.element);
+  const auto nodes = mesh.element_nodes(element);
+  std::vector<OuterSide> outer;
+  std::size_t number = 0;
+  for (const SideNodes& side : element_sides(mesh.element)) {
+    std::vector<Index> corners;
+    unsigned bits = 0;
+    for (int k = 0; k < traits(kind.facet).corners; ++k) {
+      corners.push_back(nodes[side[k]]);
+      bits |= 1U << side[k];
+    }
+    const auto neighbour = std::find_if(at[corners[0]].begin(), at[corners[0]].end(), [&](Index e) {
+      const auto others = mesh.element_nodes(e);
+      return e != element && std::all_of(corners.begin(), corners.end(), [&](Index corner) {
+               return std::find(others.begin(), others.end(), corner) != others.end();
+             });
+    });
+    const bool is_surface = neighbour == at[corners[0]].end();
+    if (is_surface || !std::binary_search(patch.begin(), patch.end(), *neighbour))
+      outer.push_back({number, bits, !is_surface});
+    ++number;
+  }
+  return outer;
+}
+
 std::vector<Index> surface_nodes(const PatchMesh& patch) {
   std::vector<Index> nodes = patch.surface;
   sort_unique(nodes);
@@ -217,6 +210,33 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, c
   Eigen::SparseMatrix<double, Eigen::RowMajor> result(d * patch.shape.rows(), d * patch.shape.cols());
   result.setFromTriplets(entries.begin(), entries.end());
   return result;
+}
+
+Eigen::MatrixXd patch_stiffness(const Model& model, const PatchMesh& patch) {
+  const auto d = static_cast<Eigen::Index>(model.dimension());
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(d * std::ssize(patch.nodes), d * std::ssize(patch.nodes));
+  for (const Index e : patch.elements) {
+    const Material& material =
+        model.materials[static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)])];
+    const ElementMatrix K_e = element_stiffness(model.mesh.element, element_nodes(model.mesh, e),
+                                                elasticity_matrix(material, model.analysis), model.thickness);
+    std::vector<Eigen::Index> place;  // dof of the patch for each of the element, -1 if held
+    for (const Index node : model.mesh.element_nodes(e)) {
+      const auto found = std::lower_bound(patch.nodes.begin(), patch.nodes.end(), node);
+      const bool is_in = found != patch.nodes.end() && *found == node;
+      for (Eigen::Index axis = 0; axis < d; ++axis) {
+        const bool is_free = is_in && (model.fixed[static_cast<std::size_t>(node)] >> axis & 1) == 0;
+        place.push_back(is_free ? d * (found - patch.nodes.begin()) + axis : -1);
+      }
+    }
+    for (std::size_t i = 0; i < place.size(); ++i) {
+      for (std::size_t j = 0; j < place.size(); ++j) {
+        if (place[i] >= 0 && place[j] >= 0)
+          K(place[i], place[j]) += K_e(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
+    }
+  }
+  return K;
 }
 
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,

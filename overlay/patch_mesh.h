@@ -33,12 +33,24 @@ std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std:
 /// Nodes of some elements, without duplicates, ascending.
 std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements);
 
+/// A side of a patch element that no other patch element has.
+struct OuterSide {
+  std::size_t number;  ///< among the element's sides
+  unsigned corners;    ///< bit k: the element's corner k is on it
+  bool is_border;      ///< the body goes on behind it; else it is the body's surface
+};
+
+/// Outer sides of an element of a patch of elements, which are ascending.
+std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> patch,
+                                   Index element);
+
 /// A patch of elements and the mesh nested in it.
 struct PatchMesh {
   std::vector<Index> elements;  ///< elements of the body, ascending
   std::vector<Index>
-      nodes;   ///< [g] mesh nodes of those elements that are not held along every axis, ascending
-  Mesh local;  ///< the fine mesh
+      nodes;              ///< [g] mesh nodes of those elements that are not held along every axis, ascending
+  Mesh local;             ///< the fine mesh
+  bool is_nested = true;  ///< false: it fills another space than the elements, or with other shape functions
   std::vector<Index> body_node;         ///< [local nodes] coincident node of the body, -1 if there is none
   std::vector<Vec3> rest_displacement;  ///< [local nodes] u0 there, by the body's shape functions [m]
   std::vector<Index> parent;            ///< [local elements] element of the body that contains it
@@ -59,6 +71,9 @@ std::vector<Index> surface_nodes(const PatchMesh& patch);
 /// The body's shape functions by dofs, without the dofs along which its nodes are held: maps u_G of the
 /// patch's nodes [d g] to all local dofs [d local nodes]. [d local nodes x d g]
 Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, const PatchMesh& patch);
+
+/// Stiffness [d g x d g] of the body's own elements in the patch [N/m]; zero for dofs that are held.
+Eigen::MatrixXd patch_stiffness(const Model& model, const PatchMesh& patch);
 
 /// Cuts each of the elements into r^d. Throws Error unless r >= 2, if an element is not one of the model's,
 /// or if there is none. `cuts` keeps subdivisions from patch to patch.

@@ -50,12 +50,11 @@ TangentCondensation::TangentCondensation(const Model& model, const PatchMesh& pa
       d_(model.dimension()),
       surface_(surface_nodes(patch)),
       layers_(patch, model.dimension(), surface_),
-      shape_(shape_by_dofs(model, patch)),
-      K_(layers_, shape_.cols() + 1) {}
+      shape_(shape_by_dofs(model, patch)) {}
 
 bool TangentCondensation::set(const Eigen::SparseMatrix<double>& K, const VectorXd& f) {
   const Eigen::Index body_dofs = shape_.cols();
-  K_ = LayeredStiffness(layers_, body_dofs + 1);
+  K_.clear(layers_, body_dofs + 1);
   K_GG_ = MatrixXd::Zero(body_dofs, body_dofs);
   Entries entries(layers_, shape_, d_, K_, K_GG_);
   for (Eigen::Index column = 0; column < K.outerSize(); ++column) {

@@ -30,7 +30,7 @@ Tool tool_of(const Settings& settings, const Body& body) {
 State state_of(const Settings& settings, const Body& body, const Tool& tool) {
   return State(body, {.tools = {tool},
                       .max_contacts = settings.max_contacts,
-                      .patch_nodes = settings.overlay ? patch_room(body, settings.overlay->rings, 1) : 0,
+                      .patch_nodes = body.refinement() > 1 ? patch_room(body, settings.overlay->rings, 1) : 0,
                       .tick = 1.0 / static_cast<double>(settings.rate)});
 }
 
@@ -60,10 +60,11 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
     safety_.emplace(*settings.safety);
   }
   const bool in_background = !options_.fast && !options_.session;
-  if (settings.overlay) {
+  if (body.refinement() > 1) {
     if (options_.session) check_overlays(*options_.session, body);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
+                                         .finest = settings.finest(),
                                          .law = settings.overlay_law,
                                          .memory = settings.overlay_memory,
                                          .in_background = in_background});

@@ -29,34 +29,6 @@ LiveInput input_of(const Model& model, const PatchMesh& mesh) {
   return input;
 }
 
-/// Stiffness [d g x d g] of the body's own elements in the patch; zero for held nodes.
-MatrixXd linear_stiffness(const Model& model, const PatchMesh& patch) {
-  const auto d = static_cast<Eigen::Index>(model.dimension());
-  MatrixXd K = MatrixXd::Zero(d * std::ssize(patch.nodes), d * std::ssize(patch.nodes));
-  for (const Index e : patch.elements) {
-    const Material& material =
-        model.materials[static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)])];
-    const ElementMatrix K_e = element_stiffness(model.mesh.element, element_nodes(model.mesh, e),
-                                                elasticity_matrix(material, model.analysis), model.thickness);
-    std::vector<Eigen::Index> place;  // dof of the patch for each of the element, -1 if held
-    for (const Index node : model.mesh.element_nodes(e)) {
-      const auto found = std::lower_bound(patch.nodes.begin(), patch.nodes.end(), node);
-      const bool is_in = found != patch.nodes.end() && *found == node;
-      for (Eigen::Index axis = 0; axis < d; ++axis) {
-        const bool is_free = is_in && (model.fixed[static_cast<std::size_t>(node)] >> axis & 1) == 0;
-        place.push_back(is_free ? d * (found - patch.nodes.begin()) + axis : -1);
-      }
-    }
-    for (std::size_t i = 0; i < place.size(); ++i) {
-      for (std::size_t j = 0; j < place.size(); ++j) {
-        if (place[i] >= 0 && place[j] >= 0)
-          K(place[i], place[j]) += K_e(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-      }
-    }
-  }
-  return K;
-}
-
 /// Xi_QQ^-1, with an arbitrary uncoupled stiffness for held dofs.
 MatrixXd stiffness_at(const Body& body, std::span<const Index> stored) {
   MatrixXd greens = greens_at(body, stored);
@@ -78,7 +50,7 @@ HyperelasticPatch::HyperelasticPatch(const Body& body, PatchMesh mesh)
       stored_(stored_nodes_of(body, mesh_)),
       local_of_surface_(body.surface_rest_positions().size(), -1),
       stiffness_(stiffness_at(body, stored_)),
-      linear_(linear_stiffness(body.model(), mesh_)) {
+      linear_(patch_stiffness(body.model(), mesh_)) {
   const std::vector<Index> local = surface_nodes(mesh_);
   const std::vector<Index> numbers = surface_numbers(body, mesh_, local);
   for (std::size_t k = 0; k < local.size(); ++k)

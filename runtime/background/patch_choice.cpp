@@ -43,6 +43,11 @@ PatchChoice::PatchChoice(const Body& body, const State& state)
 
 /// Distributes a weight over the body's nodes that a surface node follows.
 void PatchChoice::add_share(const Body& body, Index surface_node, double share) noexcept {
+  if (body.rounding() != nullptr) {
+    touched_[count_] = surface_node;
+    share_[count_++] = share;
+    return;
+  }
   const SurfaceParts parts = body.surface_parts(surface_node);
   for (std::size_t p = 0; p < parts.stored.size(); ++p) {
     const auto end = touched_.begin() + static_cast<std::ptrdiff_t>(count_);
@@ -70,6 +75,27 @@ Index PatchChoice::chosen(Index present) const noexcept {
   return present >= 0 && of_best <= of_present + tuning.patches.clearly_more * sum ? present : best;
 }
 
+/// Returns the surface node nearest to the middle of the weights; the present one unless it is clearly
+/// farther away.
+Index PatchChoice::nearest_to_middle(const Body& body, Index present) const noexcept {
+  const std::span<const Vec3> rest = body.surface_rest_positions();
+  Vec3 middle = Vec3::Zero();
+  double sum = 0.0;
+  for (std::size_t k = 0; k < count_; ++k) {
+    middle += share_[k] * rest[touched_[k]];
+    sum += share_[k];
+  }
+  if (!(sum > 0.0)) return present;
+  middle /= sum;
+  Index best = -1;
+  const auto distance = [&](Index node) { return (rest[node] - middle).norm(); };
+  for (std::size_t k = 0; k < count_; ++k) {
+    if (best < 0 || distance(touched_[k]) < distance(best)) best = touched_[k];
+  }
+  const double margin = tuning.patches.farther * body.mean_surface_edge();
+  return present >= 0 && distance(present) <= distance(best) + margin ? present : best;
+}
+
 Index PatchChoice::touched_centre(const Body& body, const State& state, std::size_t number) noexcept {
   count_ = 0;
   for (const ContactPoint& contact : state.contacts()) {
@@ -78,7 +104,8 @@ Index PatchChoice::touched_centre(const Body& body, const State& state, std::siz
       if (contact.nodes[n] >= 0) add_share(body, contact.nodes[n], share_of(contact) * contact.weights[n]);
     }
   }
-  return chosen(tools_[number].centre);
+  return body.rounding() != nullptr ? nearest_to_middle(body, tools_[number].centre)
+                                    : chosen(tools_[number].centre);
 }
 
 Index PatchChoice::nearest_centre(const Body& body, const NearestSimplex& found, Index present) noexcept {
@@ -87,7 +114,7 @@ Index PatchChoice::nearest_centre(const Body& body, const NearestSimplex& found,
       body.simplices().subspan(d * static_cast<std::size_t>(found.simplex), d);
   count_ = 0;
   for (std::size_t k = 0; k < d; ++k) add_share(body, corners[k], found.nearest.weights[k]);
-  return chosen(present);
+  return body.rounding() != nullptr ? nearest_to_middle(body, present) : chosen(present);
 }
 
 void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t number) noexcept {

@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// Centres of a patch: stored nodes, ascending; unused entries are -1.
+/// Centres of a patch, ascending: stored nodes, of a rounded body surface nodes; unused entries are -1.
 struct PatchKey {
   std::array<Index, most_overlay_tools> centres{-1, -1, -1, -1};
 
@@ -58,6 +58,7 @@ class PatchChoice {
   [[nodiscard]] Index nearest_centre(const Body& body, const NearestSimplex& found, Index present) noexcept;
   void add_share(const Body& body, Index surface_node, double share) noexcept;
   [[nodiscard]] Index chosen(Index present) const noexcept;
+  [[nodiscard]] Index nearest_to_middle(const Body& body, Index present) const noexcept;
 
   double reach_;  // distance from the body within which a tool gets overlays [m]
   std::int64_t ticks_ = 0;

@@ -21,10 +21,12 @@ const char* name_of(PatchLaw law) noexcept {
 PatchSource::PatchSource(const Body& body, const State& state, const PatchSourceOptions& options)
     : body_(body),
       options_(options),
-      maker_(body, options.rings),
+      maker_(body, options.rings, options.finest),
       choice_(body, state),
       slots_(most_patches),
-      first_slot_(static_cast<std::size_t>(body.greens().nodes()), -1),
+      first_slot_(maker_.is_graded() ? body.surface_rest_positions().size()
+                                     : static_cast<std::size_t>(body.greens().nodes()),
+                  -1),
       next_slot_(most_patches, -1),
       requests_(PatchRequests{}),
       deliveries_(2 * most_patches),

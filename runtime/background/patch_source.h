@@ -29,6 +29,7 @@ const char* name_of(PatchLaw law) noexcept;
 
 struct PatchSourceOptions {
   int rings = OverlayOptions{}.rings;
+  double finest = 0.0;  ///< of graded patches (PatchMaker) [m]
   PatchLaw law = PatchLaw::linear;
   std::size_t memory = std::size_t{512} << 20;  ///< limit for all patches [byte]
   bool in_background = true;  ///< false: `serve` builds missing patches itself, for runs without a hand
@@ -118,7 +119,7 @@ class PatchSource {
 
   // The tick's side.
   std::vector<Delivery> slots_;
-  std::vector<Index> first_slot_;  // [stored nodes] first slot of patches with this first centre; -1: none
+  std::vector<Index> first_slot_;  // [centres] first slot of patches with this first centre; -1: none
   std::vector<Index> next_slot_;   // [slots] next one with the same first centre
   Latest<PatchRequests> requests_;
   Ring<Delivery> deliveries_;

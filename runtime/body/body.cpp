@@ -134,7 +134,7 @@ void follow_body(const FineSurface& fine, const Model& model, const std::vector<
     if (stored >= 0 && model.fixed[mesh_node] == 0) parts.free.push_back(stored);
   }
   for (std::size_t node = 0; node < static_cast<std::size_t>(fine.nodes()); ++node) {
-    Vec3 rest = Vec3::Zero();
+    Vec3 rest = fine.rise.empty() ? Vec3(Vec3::Zero()) : fine.rise[node];
     std::vector<std::pair<Index, double>> of_node;
     for (auto k = static_cast<std::size_t>(fine.first[node]);
          k < static_cast<std::size_t>(fine.first[node + 1]); ++k) {
@@ -159,9 +159,11 @@ struct Body::Made {
   Model model;
   std::vector<Index> stored_of_mesh;
   FineSurface fine;
+  std::shared_ptr<const Rounding> rounding;
 };
 
-Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact) {
+Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
+                      bool rounded) {
   BodyParts parts{.name = model.name,
                   .greens = take_greens(model, options, contact),
                   .contact_model = contact,
@@ -176,23 +178,28 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   std::vector<Index> stored_of_mesh(model.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < model.stored_nodes.size(); ++k)
     stored_of_mesh[model.stored_nodes[k]] = static_cast<Index>(k);
-  FineSurface fine = refinement > 1 ? make_fine_surface(model, refinement) : surface_as_it_is(model);
+  std::shared_ptr<const Rounding> rounding;
+  if (rounded) rounding = std::make_shared<const Rounding>(model.mesh);
+  FineSurface fine =
+      refinement > 1 ? make_fine_surface(model, refinement, rounding.get()) : surface_as_it_is(model);
   order_by_last_part(fine, stored_of_mesh);
   follow_body(fine, model, stored_of_mesh, parts);
   parts.simplices = fine.simplices;
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
-  return {std::move(parts), std::move(model), std::move(stored_of_mesh), std::move(fine)};
+  return {std::move(parts), std::move(model), std::move(stored_of_mesh), std::move(fine),
+          std::move(rounding)};
 }
 
 Body::Body(Made made)
     : ElasticBody(std::move(made.parts)),
       model_(std::move(made.model)),
       stored_of_mesh_(std::move(made.stored_of_mesh)),
-      fine_(std::move(made.fine)) {}
+      fine_(std::move(made.fine)),
+      rounding_(std::move(made.rounding)) {}
 
-Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact)
-    : Body(make(std::move(model), options, refinement, contact)) {}
+Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool rounded)
+    : Body(make(std::move(model), options, refinement, contact, rounded)) {}
 
 Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options)
     : Body(std::move(model), options, 1, ContactModel::live) {
@@ -202,12 +209,19 @@ Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptio
 std::vector<Vec3> Body::surface_in_mesh() const {
   std::vector<Vec3> positions(surface_rest_positions().size(), Vec3::Zero());
   for (std::size_t node = 0; node < positions.size(); ++node) {
-    for (auto k = static_cast<std::size_t>(fine_.first[node]);
-         k < static_cast<std::size_t>(fine_.first[node + 1]); ++k) {
-      positions[node] += fine_.weights[k] * model_.mesh.nodes[fine_.parents[k]];
-    }
+    positions[node] = flat_position(static_cast<Index>(node));
+    if (!fine_.rise.empty()) positions[node] += fine_.rise[node];
   }
   return positions;
+}
+
+Vec3 Body::flat_position(Index surface_node) const {
+  const auto node = static_cast<std::size_t>(surface_node);
+  Vec3 position = Vec3::Zero();
+  for (auto k = static_cast<std::size_t>(fine_.first[node]);
+       k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
+    position += fine_.weights[k] * model_.mesh.nodes[fine_.parents[k]];
+  return position;
 }
 
 }  // namespace palpate

@@ -18,11 +18,12 @@ struct LiveParts;
 class Body : public ElasticBody {
  public:
   /// Takes over the model and unfolds its Green's functions. The contact surface consists of the elements'
-  /// facets, each element divided into r^d for `refinement` r > 1, as in the overlays to be used. Throws
+  /// facets, each element divided into r^d for `refinement` r > 1, as in the overlays to be used, on flat
+  /// facets or `rounded` (Rounding). Throws
   /// Error if no free surface node is stored, since the body could not be touched, if the sizes of the
   /// model's parts are inconsistent, or for dynamic contact with a model without dynamics.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
-                ContactModel contact = ContactModel::quasi_static);
+                ContactModel contact = ContactModel::quasi_static, bool rounded = false);
   /// Body that is solved during the touch; `live` comes from `live_model` of the same model.
   Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options = {});
 
@@ -46,15 +47,21 @@ class Body : public ElasticBody {
   [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }
   /// [S] positions in the mesh, without loads [m].
   [[nodiscard]] std::vector<Vec3> surface_in_mesh() const;
+  /// That of one node where the body's facets are flat [m].
+  [[nodiscard]] Vec3 flat_position(Index surface_node) const;
+  /// How the refined surface is rounded; null: it is flat as the mesh.
+  [[nodiscard]] const Rounding* rounding() const noexcept { return rounding_.get(); }
 
  private:
   struct Made;
-  static Made make(Model model, const GreensOptions& options, int refinement, ContactModel contact);
+  static Made make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
+                   bool rounded);
   explicit Body(Made made);
 
   Model model_;
   std::vector<Index> stored_of_mesh_;  // [N]
   FineSurface fine_;
+  std::shared_ptr<const Rounding> rounding_;
   std::shared_ptr<const LiveParts> live_;
 };
 

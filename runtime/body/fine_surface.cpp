@@ -15,7 +15,8 @@ constexpr double no_part = 1e-12;  // threshold of a shape function
 
 class Builder {
  public:
-  Builder(const Model& model, int r) : mesh_(model.mesh), cuts_(model.mesh.element, r) {
+  Builder(const Model& model, int r, const Rounding* rounding)
+      : mesh_(model.mesh), cuts_(model.mesh.element, r), rounding_(rounding) {
     result_.mesh_nodes = model.surface;
     std::sort(result_.mesh_nodes.begin(), result_.mesh_nodes.end());
     result_.mesh_nodes.erase(std::unique(result_.mesh_nodes.begin(), result_.mesh_nodes.end()),
@@ -32,6 +33,7 @@ class Builder {
       const auto nodes = mesh_.element_nodes(side.element);
       const auto corners = nodes.first(traits(mesh_.element).corners);
       const Subdivision& parts = cuts_.of(corners);
+      result_.denominator = parts.denominator;
       for (const Index node : parts.sides[side.side])
         surface.facets.push_back(number_of(parts.nodes[node], corners, nodes));
       elements.resize(static_cast<std::size_t>(surface.count()), side.element);
@@ -52,6 +54,8 @@ class Builder {
       result_.weights.push_back(weight);
     }
     result_.first.push_back(static_cast<Index>(result_.parents.size()));
+    result_.corners.push_back({-1, -1, -1, -1});
+    if (rounding_ != nullptr) result_.rise.emplace_back(Vec3::Zero());
     return result_.nodes() - 1;
   }
 
@@ -70,15 +74,30 @@ class Builder {
     if (parts.size() == 1) {
       const auto place =
           std::lower_bound(result_.mesh_nodes.begin(), result_.mesh_nodes.end(), parts.front().first);
-      return static_cast<Index>(place - result_.mesh_nodes.begin());
+      return enter(static_cast<Index>(place - result_.mesh_nodes.begin()), key);
     }
-    const Index number = add_node(parts);
+    return enter(add_node(parts), key);
+  }
+
+  Index enter(Index number, const NodeKey& key) {
     result_.number.emplace(key, number);
+    for (std::size_t k = 0; k < key.size(); ++k) result_.corners[number][k] = key[k].first;
+    raise(number, key);
     return number;
+  }
+
+  void raise(Index number, const NodeKey& key) {
+    if (rounding_ == nullptr) return;
+    double sum = 0.0;
+    for (const auto& [corner, weight] : key) sum += weight;
+    std::vector<std::pair<Index, double>> weights;
+    for (const auto& [corner, weight] : key) weights.emplace_back(corner, weight / sum);
+    result_.rise[number] = rounding_->offset(weights);
   }
 
   const Mesh& mesh_;
   Subdivisions cuts_;
+  const Rounding* rounding_;
   FineSurface result_;
 };
 
@@ -102,13 +121,15 @@ void reorder(FineSurface& surface, std::span<const Index> order) {
       surface.weights.push_back(old.weights[part]);
     }
     surface.first.push_back(static_cast<Index>(surface.parents.size()));
+    surface.corners[of_body + k] = old.corners[from];
+    if (!surface.rise.empty()) surface.rise[of_body + k] = old.rise[from];
   }
   for (Index& node : surface.simplices) node = number[node];
   for (auto& [key, node] : surface.number) node = number[node];
 }
 
-FineSurface make_fine_surface(const Model& model, int r) {
-  return Builder(model, r).build();
+FineSurface make_fine_surface(const Model& model, int r, const Rounding* rounding) {
+  return Builder(model, r, rounding).build();
 }
 
 }  // namespace palpate

@@ -2,33 +2,33 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
 #include <numeric>
 #include <string>
 
 #include "base/error.h"
 
 namespace palpate {
+namespace {
+
+constexpr double least_weight = 1e-12;  // that counts
+
+}  // namespace
+
 using Eigen::MatrixXd;
 
 std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
                                    const std::vector<Index>& local_nodes) {
   std::vector<Index> number(mesh.local.nodes.size(), -1);
-  const std::map<NodeKey, Index>& surface = body.fine_surface().number;
-  const std::span<const Index> of_body = body.surface_mesh_nodes();
   for (const auto& [key, local] : mesh.node_of_key) {
-    const auto found = surface.find(key);
-    if (found != surface.end()) number[local] = found->second;
+    const auto found = body.fine_surface().number.find(key);
+    if (found != body.fine_surface().number.end()) number[local] = found->second;
   }
   std::vector<Index> result;
-  for (const Index local : local_nodes) {
-    Index node = number[local];
-    if (node < 0) {
-      // At a mesh node, one shape function alone is not zero; held mesh nodes are not in Q.
-      node = static_cast<Index>(std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[local]) -
-                                of_body.begin());
-    }
-    result.push_back(node);
-  }
+  for (const Index local : local_nodes) result.push_back(number[local]);
   return result;
 }
 
@@ -62,23 +62,11 @@ std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch) {
   return stored;
 }
 
-std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
-                                        const CondensedPatch& condensed, const PatchOffset& offset) {
-  Patch::Parts parts;
-  parts.elements = mesh.elements;
-  parts.stored_nodes = stored_nodes_of(body, mesh);
-  const auto d = static_cast<Eigen::Index>(body.dimension());
-  const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
-  std::vector<std::size_t> order(numbers.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
-  std::vector<Eigen::Index> dofs;
-  for (const std::size_t k : order) {
-    parts.surface_nodes.push_back(numbers[k]);
-    for (Eigen::Index axis = 0; axis < d; ++axis) dofs.push_back(d * static_cast<Eigen::Index>(k) + axis);
-  }
+namespace {
 
+/// Fills what a patch has of its nodes' compliance; `dofs` orders those of the condensed patch.
+void put_compliance(const Body& body, const CondensedPatch& condensed, const std::vector<Eigen::Index>& dofs,
+                    const PatchOffset& offset, Patch::Parts& parts) {
   const MatrixXd greens = greens_at(body, parts.stored_nodes);
   const MatrixXd M = overlay_correction(condensed.G, greens);
   const MatrixXd T = condensed.T(dofs, Eigen::all);
@@ -96,6 +84,96 @@ std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
     parts.offset_forces = offset.forces + M * moved;
     parts.offset = H * moved + offset.surface(dofs);
   }
+}
+
+/// Calls visit(surface node, its weights of the corners) for those on a facet of the body's mesh.
+void for_each_node_on(const Body& body, std::span<const Index> corners, int denominator, auto&& visit) {
+  for (int i = 0; i <= denominator; ++i) {
+    for (int j = 0; j <= denominator - i; ++j) {
+      if (corners.size() == 2 && j != denominator - i) continue;
+      const std::array<int, 3> weights = {i, j, denominator - i - j};
+      NodeKey key;
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        if (weights[k] > 0) key.emplace_back(corners[k], weights[k]);
+      }
+      std::sort(key.begin(), key.end());
+      visit(body.fine_surface().number.at(key), Vec3(weights[0], weights[1], weights[2]) / denominator);
+    }
+  }
+}
+
+/// Weights of a point of a body's facet in terms of a part of it.
+Vec3 weights_in(const GradedFacet& part, const Vec3& weights, std::size_t corners) {
+  Mat3 of_part = Mat3::Identity();
+  for (std::size_t k = 0; k < corners; ++k) of_part.col(static_cast<Eigen::Index>(k)) = part.weights[k];
+  return of_part.partialPivLu().solve(weights);
+}
+
+}  // namespace
+
+std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
+                                        const CondensedPatch& condensed, const PatchOffset& offset) {
+  Patch::Parts parts;
+  parts.elements = mesh.elements;
+  parts.stored_nodes = stored_nodes_of(body, mesh);
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
+  std::vector<std::size_t> order(numbers.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
+  std::vector<Eigen::Index> dofs;
+  for (const std::size_t k : order) {
+    parts.surface_nodes.push_back(numbers[k]);
+    for (Eigen::Index axis = 0; axis < d; ++axis) dofs.push_back(d * static_cast<Eigen::Index>(k) + axis);
+  }
+  put_compliance(body, condensed, dofs, offset, parts);
+  return std::make_shared<const Patch>(std::move(parts));
+}
+
+std::shared_ptr<const Patch> make_patch(const Body& body, const GradedMesh& mesh,
+                                        const CondensedPatch& condensed) {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  std::vector<Index> place(mesh.mesh.local.nodes.size(), -1);  // in the condensed surface
+  for (std::size_t k = 0; k < condensed.surface.size(); ++k)
+    place[condensed.surface[k]] = static_cast<Index>(k);
+
+  struct Follower {
+    double outside = std::numeric_limits<double>::infinity();  // by how much a weight is below 0
+    std::vector<Patch::Part> parts;
+  };
+  std::map<Index, Follower> followers;  // of surface nodes
+  const int denominator = body.fine_surface().denominator;
+  for (const GradedFacet& facet : mesh.facets) {
+    for_each_node_on(body, std::span(facet.corners).first(d), denominator, [&](Index node, const Vec3& at) {
+      const Vec3 weights = weights_in(facet, at, d);
+      const double outside = -weights.head(static_cast<Eigen::Index>(d)).minCoeff();
+      Follower& follower = followers[node];
+      if (outside >= follower.outside) return;
+      follower = {outside, {}};
+      const auto add = [&](std::size_t k, double weight) {
+        if (std::abs(weight) > least_weight) follower.parts.push_back({place[facet.nodes[k]], weight});
+      };
+      for (std::size_t k = 0; k < d; ++k) {
+        const double w = weights[static_cast<Eigen::Index>(k)],
+                     next = weights[static_cast<Eigen::Index>((k + 1) % d)];
+        add(k, w * (2.0 * w - 1.0));
+        if (k < (d == 2 ? 1U : 3U)) add(d + k, 4.0 * w * next);
+      }
+    });
+  }
+  Patch::Parts parts;
+  parts.elements = mesh.mesh.elements;
+  parts.stored_nodes = stored_nodes_of(body, mesh.mesh);
+  parts.first_part.push_back(0);
+  for (const auto& [node, follower] : followers) {
+    parts.surface_nodes.push_back(node);
+    parts.follows.insert(parts.follows.end(), follower.parts.begin(), follower.parts.end());
+    parts.first_part.push_back(static_cast<Index>(parts.follows.size()));
+  }
+  std::vector<Eigen::Index> dofs(static_cast<std::size_t>(condensed.T.rows()));
+  std::iota(dofs.begin(), dofs.end(), Eigen::Index{0});
+  put_compliance(body, condensed, dofs, {}, parts);
   return std::make_shared<const Patch>(std::move(parts));
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "overlay/condensation.h"
+#include "overlay/graded_mesh.h"
 #include "overlay/patch_mesh.h"
 #include "runtime/body/body.h"
 #include "runtime/core/body/patch.h"
@@ -27,6 +28,10 @@ struct PatchOffset {
 /// surface.
 std::shared_ptr<const Patch> make_patch(const Body& body, const PatchMesh& mesh,
                                         const CondensedPatch& condensed, const PatchOffset& offset = {});
+
+/// Makes a patch of a rounded body from a graded mesh, whose shape functions its surface nodes follow.
+std::shared_ptr<const Patch> make_patch(const Body& body, const GradedMesh& mesh,
+                                        const CondensedPatch& condensed);
 
 /// Memory that a patch of this takes, at most [bytes].
 std::size_t bytes_of(const CondensedPatch& condensed) noexcept;

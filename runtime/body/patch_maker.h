@@ -12,13 +12,21 @@ namespace palpate {
 struct OverlayOptions {
   int refinement = 3;  ///< r: each element is divided into r^d
   int rings = 2;       ///< rings of elements around the centres
+  bool is_auto =
+      false;  ///< graded by the tools' radii instead (PatchMaker), if the mesh is too coarse for them
 };
 
 /// Makes patches around nodes of a body's surface. For one thread at a time.
+///
+/// Those of a rounded body are graded: finest at the centres, which are then surface nodes, and over the
+/// elements round the body's nodes that these follow.
 class PatchMaker {
  public:
-  /// For a body whose surface is refined like the overlays; it must outlive this.
-  PatchMaker(const Body& body, int rings);
+  /// For a body whose surface is refined like the overlays; it must outlive this. `finest`: longest edge of
+  /// graded patches at their centres [m].
+  PatchMaker(const Body& body, int rings, double finest = 0.0);
+
+  [[nodiscard]] bool is_graded() const noexcept { return body_.rounding() != nullptr; }
 
   /// Makes one patch over the elements within the rings around all centres (stored nodes); overlapping
   /// regions are merged. For a single centre it is taken from the file if available, otherwise condensed.
@@ -38,10 +46,29 @@ class PatchMaker {
 
  private:
   const Body& body_;
+  [[nodiscard]] GradedMesh graded(std::span<const Index> centres) const;
+
   ElementsAtNodes at_;
   Subdivisions cuts_;
   int rings_;
+  double finest_;
+  LayeredStiffness work_;
 };
+
+/// The number by which a recording names the centre of a patch: a mesh node, of a rounded body a surface
+/// node.
+[[nodiscard]] inline Index recorded_centre(const Body& body, Index centre) noexcept {
+  return body.rounding() != nullptr ? centre : body.mesh_node(centre);
+}
+/// The centre of that number; -1 if no patch can lie round it.
+[[nodiscard]] inline Index centre_of_record(const Body& body, Index number) noexcept {
+  const std::size_t count =
+      body.rounding() != nullptr ? body.surface_rest_positions().size() : body.model().mesh.nodes.size();
+  if (number < 0 || static_cast<std::size_t>(number) >= count) return -1;
+  if (body.rounding() != nullptr) return number;
+  const Index stored = body.stored_node(number);
+  return stored >= 0 && body.surface_node_of_stored(stored) >= 0 ? stored : -1;
+}
 
 /// Number of tools that overlays follow; further tools have none of their own.
 inline constexpr std::size_t most_overlay_tools = 4;

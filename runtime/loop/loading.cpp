@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <mutex>
 #include <set>
@@ -46,6 +47,20 @@ void print_loaded(const Body& body, double seconds) {
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
         "is slower");
   }
+}
+
+/// Refinement of a rounded surface whose overlays have edges of `finest`; 1 if the mesh's are no longer.
+int refinement_for(const Model& model, double finest) {
+  constexpr double contact_spacing = 0.43;  // [finest] between the nodes that tools meet
+  if (traits(model.mesh.element).corners != model.dimension() + 1) return 1;
+  const auto d = static_cast<std::size_t>(model.dimension());
+  double sum = 0.0;
+  for (std::size_t s = 0; s < model.surface.size(); s += d)
+    sum += (model.mesh.nodes[model.surface[s]] - model.mesh.nodes[model.surface[s + 1]]).norm();
+  const double edge = sum / static_cast<double>(model.surface.size() / d);  // of tet10 half of an edge
+  if (edge * (model.mesh.element == ElementType::tet10 ? 2.0 : 1.0) <= finest) return 1;
+  return std::clamp(static_cast<int>(std::ceil(edge / (contact_spacing * finest))), least_refinement,
+                    most_refinement);
 }
 
 /// Refuses settings that a warped body does not support.
@@ -116,7 +131,8 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   if (options.warp) {
     return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   }
-  return Body(std::move(model), {}, options.refinement, options.contact);
+  const int by_edges = options.finest > 0.0 ? refinement_for(model, options.finest) : 1;
+  return Body(std::move(model), {}, std::max(options.refinement, by_edges), options.contact, by_edges > 1);
 }
 
 void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {

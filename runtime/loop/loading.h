@@ -13,7 +13,8 @@ namespace palpate {
 
 /// Options for making a body from a file.
 struct BodyOptions {
-  int refinement = 1;  ///< refinement of the surface, see Body
+  int refinement = 1;   ///< refinement of the surface, see Body
+  double finest = 0.0;  ///< [m] if not 0: rounded, with edges of at most this if the mesh's are longer
   PatchLaw overlay_law = PatchLaw::linear;
   ContactModel contact = ContactModel::quasi_static;
   double load_scale = 1.0;  ///< see scale_loads

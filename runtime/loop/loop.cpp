@@ -5,6 +5,7 @@
 #include <ctime>
 #include <utility>
 
+#include "runtime/body/patch_maker.h"
 #include "runtime/core/touch/contact_nodes.h"
 #include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/tick_record.h"
@@ -149,7 +150,7 @@ class Loop {
       if (then == nullptr) {
         parts_.overlays->serve(parts_.state);
       } else {
-        const Index centre = then->patch < 0 ? -1 : parts_.body.stored_node(then->patch);
+        const Index centre = centre_of_record(parts_.body, then->patch);
         const bool older = has(static_cast<StepStatus>(then->status), StepStatus::older_patch);
         parts_.overlays->serve(parts_.state, centre, older);
       }

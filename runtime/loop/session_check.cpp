@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "base/error.h"
+#include "runtime/body/patch_maker.h"
 #include "runtime/core/tick/status.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
@@ -53,8 +54,7 @@ void check_overlays(const RecordingFile& session, const Body& body) {
   for (std::int64_t k = 0; k < session.ticks(); ++k) {
     const Index node = session.tick(k).patch;
     if (node < 0) continue;
-    const Index stored = node < nodes ? body.stored_node(node) : -1;
-    if (stored >= 0 && body.surface_node_of_stored(stored) >= 0) continue;
+    if (centre_of_record(body, node) >= 0) continue;
     throw Error(
         fmt::format("/tool/0/tick, row {}: patch is {}, which is no node that an overlay can lie round: "
                     "the body has {} nodes",

@@ -61,6 +61,7 @@ std::string text_of(bool yes) {
   return yes ? "yes" : "no";
 }
 std::string text_of(const OverlayOptions& overlay) {
+  if (overlay.is_auto) return "auto";
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
 }
 std::string text_of(const Vec3& place) {
@@ -238,7 +239,7 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                 "factor on all Young's moduli, exact, without precomputing again", positive_number,
                 s.stiffness_scale != 1.0},
         s.stiffness_scale);
-  visit(Setting{"overlay", group, "r=R,rings=N", "", "none",
+  visit(Setting{"overlay", group, "auto|r=R,rings=N", "", "none",
                 fmt::format("a finer mesh under the tool (s-FEM): each element within N rings of it, from 1 "
                             "to {}, is cut into R to the power of the dimension, R from {} to {}",
                             most_rings, least_refinement, most_refinement),

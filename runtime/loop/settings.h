@@ -44,6 +44,8 @@ struct Settings {
 
   [[nodiscard]] WorkspaceOptions workspace() const;
   [[nodiscard]] BodyOptions body() const;
+  /// Longest edge of graded overlays where the tool touches [m]; 0 if there are none.
+  [[nodiscard]] double finest() const;
 };
 
 /// Section of the help. Settings of the loop and the workspace are constant during a run.

@@ -11,7 +11,8 @@
 namespace palpate {
 namespace {
 
-constexpr double usual_edge = 0.1;  // [radius] default rounding of a disc's edge
+constexpr double edge_per_radius = 0.35;  // of graded overlays at the touch, by the tool's radius
+constexpr double usual_edge = 0.1;        // [radius] default rounding of a disc's edge
 
 }  // namespace
 
@@ -24,7 +25,8 @@ WorkspaceOptions Settings::workspace() const {
 }
 
 BodyOptions Settings::body() const {
-  return {.refinement = overlay ? overlay->refinement : 1,
+  return {.refinement = overlay && !overlay->is_auto ? overlay->refinement : 1,
+          .finest = finest(),
           .overlay_law = overlay_law,
           .contact = contact,
           .load_scale = load_scale,
@@ -64,8 +66,14 @@ Tool parse_shape(const std::string& text) {
   return tool;
 }
 
+double Settings::finest() const {
+  if (!overlay || !overlay->is_auto) return 0.0;
+  return edge_per_radius * (tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius);
+}
+
 OverlayOptions parse_overlay(const std::string& text, const std::string& where) {
   OverlayOptions overlay;
+  if (text == "auto") return {.rings = 1, .is_auto = true};
   for (const std::string_view part : split_commas(text)) {
     const auto [name, number] = split_named(part);
     const std::optional<Index> value = parse_index(std::string(number));
@@ -76,7 +84,7 @@ OverlayOptions parse_overlay(const std::string& text, const std::string& where) 
     } else {
       throw Error(fmt::format("'{}' is neither r={} to r={} nor rings=1 to rings={}", part, least_refinement,
                               most_refinement, most_rings),
-                  where, "write for instance r=3,rings=2");
+                  where, "write auto, or for instance r=3,rings=2");
     }
   }
   return overlay;

@@ -4,6 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "runtime/body/patch_maker.h"
+
 namespace palpate {
 namespace {
 
@@ -38,7 +40,7 @@ void record_tool(TickRecord& record, const Body& body, const State& state, const
   set(record.stiffness, tool.local.stiffness);
   record.contacts = tool.contacts;
   record.status = static_cast<std::uint32_t>(state.status);
-  if (centre >= 0) record.patch = body.mesh_node(centre);
+  if (centre >= 0) record.patch = recorded_centre(body, centre);
   record.motion_step = state.surface.motion.sample_step();
   record.force_error = static_cast<float>(std::min<double>(tool.force_error, largest_float));
   record.left_out = tool.left_out;

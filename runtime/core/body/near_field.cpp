@@ -46,6 +46,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
   work_.blocks.resize(blocks(capacity));
   work_.by_followed.resize(blocks(followed_.room()));
   work_.gathered.resize(blocks(std::max(followed_.room(), patch_nodes)));
+  work_.fine_row.resize(patch_nodes > 0 ? at(dimension_ * Patch::most_nodes) : 0);
 }
 
 bool NearField::is_loaded(Index place) const noexcept {
@@ -146,6 +147,8 @@ void NearField::enter(const ElasticBody& body, Index place) noexcept {
   if (patch_place(place) < 0) {
     follow(body, place, node(place));
     if (patch() != nullptr) respond(body, place);
+  } else {
+    respond_within(place);
   }
   if (patch() != nullptr && patch()->has_offset()) find_offset(place);
 }
@@ -154,8 +157,12 @@ void NearField::find_offset(Index place) noexcept {
   const Index in_patch = patch_place(place);
   for (Index axis = 0; axis < dimension_; ++axis) {
     offset_[at(dimension_ * place + axis)] =
-        in_patch >= 0 ? patch()->offset()[dimension_ * in_patch + axis]
+        in_patch >= 0 ? 0.0
                       : dot(X(dimension_ * place + axis), patch()->offset_forces().data(), patch_dofs());
+    if (in_patch < 0) continue;
+    patch()->for_each_part(in_patch, [&](Index node, double weight) {
+      offset_[at(dimension_ * place + axis)] += weight * patch()->offset()[dimension_ * node + axis];
+    });
   }
 }
 
@@ -182,7 +189,7 @@ void NearField::forget(Index place) noexcept {
     std::copy_n(row + d * last, d, row + d * place);
   }
   move(last, place);
-  if (patch() == nullptr || patch_place(place) >= 0) return;
+  if (patch() == nullptr) return;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
     std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(),
                 X(static_cast<Index>(d * place + axis)));
@@ -215,7 +222,8 @@ void NearField::move(Index from, Index to) noexcept {
 }
 
 bool NearField::change_patch(const ElasticBody& body, std::shared_ptr<const Patch> patch) noexcept {
-  if (patch != nullptr && std::ssize(patch->stored_nodes()) > beside_.room) return false;
+  if (patch != nullptr && (std::ssize(patch->stored_nodes()) > beside_.room || !load_.fits(*patch)))
+    return false;
   for (Index place = 0; patch != nullptr && place < count_; ++place) {
     if (is_group(place) && wanted_[at(place)] == tick_) return false;
   }
@@ -314,12 +322,8 @@ void NearField::spread(std::span<const double> forces) noexcept {
     if (f.isZero(0.0)) continue;
     load_followed(place, f);
     if (patch() == nullptr) continue;
-    const Index in_patch = patch_place(place);
-    for (int axis = 0; axis < dimension_; ++axis) {
-      const double* on_patch =
-          in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dimension_ * place + axis);
-      palpate::add(on_patch, f[axis], beside_.force.data(), patch_dofs());
-    }
+    for (int axis = 0; axis < dimension_; ++axis)
+      palpate::add(Y(dimension_ * place + axis), f[axis], beside_.force.data(), patch_dofs());
   }
 }
 

@@ -127,6 +127,8 @@ class NearField {
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const ElasticBody& body, Index place) noexcept;
   void respond(const ElasticBody& body, Index place) noexcept;
+  void respond_within(Index place) noexcept;
+  [[nodiscard]] const double* compliance_row(Index place, Index axis) noexcept;
   void find_offset(Index place) noexcept;
   void spread(std::span<const double> forces) noexcept;
   void load_followed(Index place, const Vec3& f) noexcept;
@@ -161,7 +163,7 @@ class NearField {
     Index room = 0;  // for nodes of a patch
     std::ptrdiff_t stride = 0;
     std::vector<Index> place_in_patch;  // [S + groups]
-    LargeVector<double> X, Y;           // [d capacity x stride] X and M X
+    LargeVector<double> X, Y;           // [d capacity x stride] X and M X; Y of a place in the patch: H
     std::vector<double> force;          // [d room] on Q
   };
   /// Blocks of a node that comes.
@@ -169,6 +171,7 @@ class NearField {
     std::vector<double> blocks;       // [d x d capacity] its block row of C
     std::vector<double> by_followed;  // [d x d followed] its displacement by forces on stored nodes
     std::vector<double> gathered;     // [d x d max(followed, patch room)]
+    std::vector<double> fine_row;     // [d most_nodes]
   };
 
   int dimension_;

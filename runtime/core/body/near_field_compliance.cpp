@@ -25,6 +25,17 @@ void NearField::respond(const ElasticBody& body, Index place) noexcept {
   }
 }
 
+/// Gathers the rows of H, which are those of Y of a node in the patch.
+void NearField::respond_within(Index place) noexcept {
+  for (int axis = 0; axis < dimension_; ++axis) {
+    double* y = Y(dimension_ * place + axis);
+    std::fill_n(y, patch_dofs(), 0.0);
+    patch()->for_each_part(patch_place(place), [&](Index node, double weight) {
+      palpate::add(patch()->response(dimension_ * node + axis), weight, y, patch_dofs());
+    });
+  }
+}
+
 /// Computes C between a node and the first `count` nodes, which are those before it and itself; for a group
 /// there may be more.
 void NearField::connect(const ElasticBody& body, Index place, Index count) noexcept {
@@ -89,15 +100,29 @@ void NearField::connect_within_patch(Index place) noexcept {
   const Index d = dimension_;
   double* block = work_.blocks.data();
   for (Index i = 0; i < d; ++i) {
-    const double* C = patch()->compliance(d * patch_place(place) + i);
-    const double* H = patch()->response(d * patch_place(place) + i);
-    for (Index other = 0; other <= place; ++other) {
-      for (Index j = 0; j < d; ++j) {
-        *block++ =
-            patch_place(other) >= 0 ? C[d * patch_place(other) + j] : dot(H, X(d * other + j), patch_dofs());
+    const double* C = compliance_row(place, i);
+    for (Index other = 0; other <= place; ++other, block += d) {
+      if (patch_place(other) < 0) {
+        for (Index j = 0; j < d; ++j) block[j] = dot(Y(d * place + i), X(d * other + j), patch_dofs());
+        continue;
       }
+      std::fill_n(block, d, 0.0);
+      patch()->for_each_part(patch_place(other), [&](Index column, double weight) {
+        for (Index j = 0; j < d; ++j) block[j] += weight * C[d * column + j];
+      });
     }
   }
+}
+
+/// Row of the compliance between a node of the patch and those of the fine mesh.
+const double* NearField::compliance_row(Index place, Index axis) noexcept {
+  if (!patch()->is_sampled()) return patch()->compliance(dimension_ * patch_place(place) + axis);
+  std::fill_n(work_.fine_row.begin(), patch()->fine_dofs(), 0.0);
+  patch()->for_each_part(patch_place(place), [&](Index node, double weight) {
+    palpate::add(patch()->compliance(dimension_ * node + axis), weight, work_.fine_row.data(),
+                 patch()->fine_dofs());
+  });
+  return work_.fine_row.data();
 }
 
 void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexcept {
@@ -121,7 +146,7 @@ void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexc
       for (Index j = 0; j < d; ++j) {
         double sum = 0.0;
         if (patch_place(other) >= 0) {
-          sum = dot(patch()->response(d * patch_place(other) + j), X(d * place + i), patch_dofs());
+          sum = dot(Y(d * other + j), X(d * place + i), patch_dofs());
         } else {
           for (const FollowedNodes::Part& part : followed_.parts(other))
             sum += part.weight * by[d * part.number + j];

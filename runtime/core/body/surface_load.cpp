@@ -18,8 +18,9 @@ SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, Index patc
     : dimension(d),
       node(static_cast<std::size_t>(stored_nodes + patch_nodes)),
       force(dofs(d, stored_nodes + patch_nodes)),
-      patch_place(static_cast<std::size_t>(patch_nodes > 0 ? near_nodes : 0)),
+      patch_place(static_cast<std::size_t>(patch_nodes > 0 ? std::max(near_nodes, Patch::most_nodes) : 0)),
       patch_force(dofs(d, static_cast<Index>(patch_place.size()))),
+      first_force(static_cast<std::size_t>(patch_nodes > 0 ? Patch::most_nodes : 0), -1),
       beside(dofs(d, patch_nodes)) {}
 
 const Greens& SurfaceLoad::greens(const ElasticBody& body) const noexcept {
@@ -28,6 +29,9 @@ const Greens& SurfaceLoad::greens(const ElasticBody& body) const noexcept {
 
 void SurfaceLoad::clear() noexcept {
   count = 0;
+  for (Index i = 0; i < patch_count; ++i) {
+    if (patch_place[i] < Patch::most_nodes) first_force[patch_place[i]] = -1;
+  }
   patch_count = 0;
   std::fill(beside.begin(), beside.end(), 0.0);
 }
@@ -39,25 +43,36 @@ void SurfaceLoad::add(Index stored, const double* f) noexcept {
 }
 
 void SurfaceLoad::add_to_patch(Index place, const double* f) noexcept {
-  patch_place[patch_count] = place;
-  std::copy_n(f, dimension, patch_force.data() + dofs(dimension, patch_count));
-  ++patch_count;
+  patch->for_each_part(place, [&](Index fine, double weight) {
+    Index at = patch->is_sampled() ? first_force[fine] : -1;
+    if (at < 0) {
+      at = patch_count++;
+      if (patch->is_sampled()) first_force[fine] = at;
+      patch_place[at] = fine;
+      std::fill_n(patch_force.data() + dofs(dimension, at), dimension, 0.0);
+    }
+    palpate::add(f, weight, patch_force.data() + dofs(dimension, at), dimension);
+  });
 }
 
 void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> u) noexcept {
   const int d = load.dimension;
   const auto body_dofs = d * std::ssize(load.patch->stored_nodes());
   for (std::size_t k = 0; k < u.size(); ++k) {
-    const Index dof = d * first + static_cast<Index>(k);
-    const double* C = load.patch->compliance(dof);
-    double sum = dot(load.patch->response(dof), load.beside.data(), body_dofs);
-    if (load.patch->has_offset()) sum += load.patch->offset()[dof];
-    for (Index i = 0; i < load.patch_count; ++i) {
-      const double* by = C + dofs(d, load.patch_place[i]);
-      const double* f = load.patch_force.data() + dofs(d, i);
-      for (int axis = 0; axis < d; ++axis) sum += by[axis] * f[axis];
-    }
-    u[k] = sum;
+    const Index axis = static_cast<Index>(k) % d;
+    u[k] = 0.0;
+    load.patch->for_each_part(first + static_cast<Index>(k) / d, [&](Index node, double weight) {
+      const Index dof = d * node + axis;
+      const double* C = load.patch->compliance(dof);
+      double sum = dot(load.patch->response(dof), load.beside.data(), body_dofs);
+      if (load.patch->has_offset()) sum += load.patch->offset()[dof];
+      for (Index i = 0; i < load.patch_count; ++i) {
+        const double* by = C + dofs(d, load.patch_place[i]);
+        const double* f = load.patch_force.data() + dofs(d, i);
+        for (int j = 0; j < d; ++j) sum += by[j] * f[j];
+      }
+      u[k] += weight * sum;
+    });
   }
 }
 

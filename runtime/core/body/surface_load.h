@@ -22,6 +22,10 @@ struct SurfaceLoad {
   void add(Index stored, const double* force) noexcept;
   /// Adds a force [N] on a surface node of the patch, given by its place there.
   void add_to_patch(Index place, const double* force) noexcept;
+  /// True if forces on the surface nodes of a patch fit.
+  [[nodiscard]] bool fits(const Patch& other) const noexcept {
+    return !other.is_sampled() || other.fine_dofs() <= dimension * Patch::most_nodes;
+  }
 
   /// Stored nodes and forces on them, d numbers each [N], that displace the body without the overlay as it is
   /// with the overlay.
@@ -41,9 +45,10 @@ struct SurfaceLoad {
   std::vector<double> force;
   std::shared_ptr<const Patch> patch;        ///< null if there is no overlay
   std::shared_ptr<const Greens> compliance;  ///< for a body that has changed; null: the body's
-  Index patch_count = 0;                     ///< number of forces on surface nodes of the patch
+  Index patch_count = 0;                     ///< number of forces on nodes of the patch's fine mesh
   std::vector<Index> patch_place;
   std::vector<double> patch_force;
+  std::vector<Index> first_force;  ///< [most_nodes] place of a node's force in these two; -1: none
   std::vector<double> beside;  ///< [d g] displacement of Q by forces outside the patch, without overlay [m]
 };
 

@@ -185,6 +185,7 @@ struct BodyTuning {
 /// Placement of overlays.
 struct PatchTuning {
   double clearly_more = 0.1;     ///< [1] lead over the centre that another node needs, of all weights
+  double farther = 0.5;          ///< [edge of the fine surface] the same for graded overlays, in distance
   double near_edges = 3.0;       ///< [edge of the body's mesh] a free tool nearer than this has an overlay
   double smoothing = 0.05;       ///< [1/tick] smoothing of the tool's velocity
   std::int64_t look_stride = 8;  ///< ticks between searches around a free tool
