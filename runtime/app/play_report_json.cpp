@@ -47,9 +47,9 @@ Json json_tool(const Tool& tool) {
 
 Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   const PatchCounts& counts = overlays.counts();
-  Json json = {{"refinement", options.refinement},
-               {"rings", options.rings},
-               {"built", overlays.built()},
+  Json json = options.is_auto ? Json{{"auto", true}}
+                              : Json{{"refinement", options.refinement}, {"rings", options.rings}};
+  json.update({{"built", overlays.built()},
                {"failed", overlays.failed()},
                {"longest_build_s", overlays.longest_build()},
                {"bytes", overlays.bytes()},
@@ -57,7 +57,7 @@ Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
                {"ticks_near", counts.ticks},
                {"older_ticks_near", counts.older},
                {"ticks_in_contact", counts.in_contact},
-               {"older_ticks_in_contact", counts.older_in_contact}};
+               {"older_ticks_in_contact", counts.older_in_contact}});
   if (overlays.tangents() == nullptr) return json;
   const PatchTangentTelling telling = overlays.tangents()->telling();
   json["neo_hookean"] = {{"made", telling.made},

@@ -70,15 +70,16 @@ void check_warp(const BodyOptions& options) {
   };
   if (options.live.solver)
     refuse("a live solver turns by itself, and has no Green's functions to warp", "--solver");
-  if (options.refinement > 1) refuse("overlays are of the body at rest, and do not turn", "--overlay");
+  if (options.has_overlays()) refuse("overlays are of the body at rest, and do not turn", "--overlay");
   if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
 }
 
 /// Checks that a model fits neo-Hookean overlays, and drops the data that they do not use.
 void prepare_for_law(Model& model, const BodyOptions& options) {
   if (options.refinement == 1) {
-    throw Error("the law is that of overlays, and there is none", "--overlay-law",
-                "give an --overlay, or leave out --overlay-law");
+    throw Error(options.finest > 0.0 ? "graded overlays are linear"
+                                     : "the law is that of overlays, and there is none",
+                "--overlay-law", "give an --overlay r=R,rings=N, or leave out --overlay-law");
   }
   if (options.contact == ContactModel::dynamic) {
     throw Error("a body whose overlays are neo-Hookean has no inertia", "--contact",
@@ -114,7 +115,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   if (options.warp) check_warp(options);
   if (options.overlay_law != PatchLaw::linear) prepare_for_law(model, options);
   if (options.live.solver) {
-    if (options.refinement > 1) {
+    if (options.has_overlays()) {
       throw Error("overlays refine Green's functions, and a live solver has none", "--overlay",
                   "leave out --overlay or --solver");
     }

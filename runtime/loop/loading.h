@@ -22,6 +22,7 @@ struct BodyOptions {
   LiveSettings live{};
   bool warp = false;  ///< Green's functions rotate with the body, see SurfaceWarp
 
+  [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || finest > 0.0; }
   bool operator==(const BodyOptions&) const = default;
 };
 
