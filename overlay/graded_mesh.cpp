@@ -244,7 +244,7 @@ class GradedBuilder {
     return found->second;
   }
 
-  /// Where a node is, and how it follows the body.
+  /// Enters the position of a node, and its shape functions of the body.
   void enter(Index node, Index parent, const Weights& weights) {
     if (known_[node] != 0) return;
     known_[node] = 1;

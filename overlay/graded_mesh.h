@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Where a patch is finest.
+/// Place at which a patch is finest.
 struct PatchFocus {
   std::vector<Vec3> points;  ///< on the flat surface of the mesh [m]
   double edge;               ///< longest edge there [m]; at a distance r from all points max(edge, r)
@@ -30,8 +30,8 @@ struct GradedMesh {
 
 /// Cuts elements of a mesh of simplices: bisects edges that are too long for their place, the longest of the
 /// elements round them first (Rivara 1984), and gives all a node in the middle of each edge. Nodes on
-/// the body's surface are moved onto `rounding`, or stay on flat facets if an element would turn over. Throws Error if the elements are
-/// no simplices, or if there are none.
+/// the body's surface are moved onto `rounding`, or stay on flat facets if an element would turn over. Throws
+/// Error if the elements are no simplices, or if there are none.
 GradedMesh make_graded_mesh(const Model& model, const ElementsAtNodes& at, const Rounding& rounding,
                             std::vector<Index> elements, const PatchFocus& focus);
 

@@ -47,9 +47,9 @@ class Body : public ElasticBody {
   [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }
   /// [S] positions in the mesh, without loads [m].
   [[nodiscard]] std::vector<Vec3> surface_in_mesh() const;
-  /// That of one node where the body's facets are flat [m].
+  /// Position of a surface node on the flat facets of the mesh [m].
   [[nodiscard]] Vec3 flat_position(Index surface_node) const;
-  /// How the refined surface is rounded; null: it is flat as the mesh.
+  /// Rounding of the refined surface; null: it is flat as the mesh.
   [[nodiscard]] const Rounding* rounding() const noexcept { return rounding_.get(); }
 
  private:
