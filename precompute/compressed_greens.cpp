@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "base/error.h"
 #include "precompute/compression/out_of_reach.h"
@@ -21,11 +20,12 @@ constexpr double bound_share = 0.5;  // largest allowed ratio of a measured erro
 constexpr int most_cuts = 5;
 constexpr std::uint64_t certificate_seed = 41;
 constexpr std::int64_t touches = 64;              // per number of nodes
-constexpr std::int64_t touch_matrices = 9;        // per thread for a touch, three of them twice as wide
+constexpr std::int64_t touch_matrices = 2;        // per thread for a touch: its compliance, and the factor
+constexpr double touch_steps = 4.0;               // of conjugate gradients (measured)
 constexpr double typical_rank = 45.0;             // for the default tolerance (measured)
 constexpr std::int64_t recompression_copies = 6;  // of the far part: skeletons are larger (measured)
-constexpr double far_share = 2.5;                 // of the time of near pairs (measured)
-constexpr double touch_share = 1.6;               // relative to the time of equally many columns of near
+constexpr double far_share = 1.8;                 // of the time of near pairs (measured)
+constexpr double touch_share = 2.5;               // relative to the time of equally many columns of near
                                                   // pairs (measured)
 
 constexpr const char* near_stage = "near pairs";
@@ -205,7 +205,8 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
       (order + typical_rank * static_cast<double>(plan.frame.far_pair.size() +
                                                   std::size_t(plan.frame.tree.clusters()))));
   const std::int64_t touched = std::int64_t{model.dimension()} * certified_nodes.back();
-  plan.memory_bytes = jobs * (compression_workspace(factor, plan.frame, touched) +
+  plan.memory_bytes = inverted_bytes(factor) +
+                      jobs * (compression_workspace(factor, plan.frame) +
                               touch_matrices * touched * touched * std::int64_t{sizeof(double)}) +
                       thread_bytes(jobs) + plan.frame.bytes() + recompression_copies * plan.far_bytes +
                       static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);
@@ -214,8 +215,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
   plan.sample_seconds = seconds_per_flop * random_loads * 4.0 * static_cast<double>(factor.entries());
   plan.far_seconds = far_share * plan.near_seconds;
   const auto touch_columns =
-      static_cast<double>(touches * model.dimension() *
-                          std::accumulate(certified_nodes.begin(), certified_nodes.end(), Index{0}));
+      touch_steps * static_cast<double>(touches * std::ssize(certified_nodes) * (model.dimension() + 3));
   plan.touch_seconds = touch_share * plan.near_seconds * touch_columns / order;
   return plan;
 }

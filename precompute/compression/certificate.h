@@ -45,10 +45,10 @@ TouchablePoints touchable_points(const Model& model, std::span<const Index> stor
 
 /// Force errors of `touches` random touches for each of certified_nodes (or of all nodes, if there are
 /// fewer): nodes nearest to a random node, some of those near it, and some of all, in turns. Displacements
-/// and error as in touch_error; the reference is solved with the factor. `touchable` are stored nodes that
-/// are free along every axis (none: no errors), `points` [N] of all stored nodes; `seed` determines the
-/// touches. `progress` gets the finished fraction and returns false to stop; the errors so far are then
-/// returned.
+/// and error as in touch_error; forces by the factor are found by conjugate gradients, to 1e-8. `touchable`
+/// are stored nodes that are free along every axis (none: no errors), `points` [N] of all stored nodes;
+/// `seed` determines the touches. `progress` gets the finished fraction and returns false to stop; the errors
+/// so far are then returned.
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,

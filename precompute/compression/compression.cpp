@@ -15,17 +15,19 @@ namespace palpate {
 namespace {
 
 using Dofs = std::vector<std::int64_t>;
+using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double skeleton_share = 0.2;      // of the cut: skeletons must not add to the error
 constexpr Index leaves_estimated = 64;      // to estimate flops
 constexpr std::int64_t loads_at_once = 32;  // solved together
 constexpr Index checks = 32;                // more loads, to measure the error of the pairs
+constexpr double single_share = 0.3;        // of the skeletons' cut, that single precision may add
 
 }  // namespace
 
 Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
                          const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress)
-    : solver_(factor),
+    : solver_(factor, sharing.jobs()),
       stored_dofs_(stored_dofs),
       sharing_(sharing),
       progress_(std::move(progress)),
@@ -121,15 +123,52 @@ bool Compression::sample() {
   return sharing_.for_each(blocks);
 }
 
+/// Root mean squares, over some loads, of the rows of L^-1 u, for displacements u [order x loads].
+Eigen::VectorXd Compression::weighed_rows(DoubleRows u) const {
+  Eigen::VectorXd rows(u.rows());
+  parallel_for(matrix_.tree.leaves(), sharing_.jobs(), [&](std::int64_t leaf, int) {
+    const Index c = matrix_.tree.first_leaf() + static_cast<Index>(leaf);
+    const std::int64_t first = first_dof(matrix_, c), count = end_dof(matrix_, c) - first;
+    auto of_leaf = u.middleRows(first, count);
+    root_of_leaf(matrix_, static_cast<Index>(leaf)).triangularView<Eigen::Lower>().solveInPlace(of_leaf);
+    rows.segment(first, count) = of_leaf.rowwise().norm() / std::sqrt(double(u.cols()));
+  });
+  return rows;
+}
+
+/// Measures what solves in single precision are off by.
+bool Compression::try_single() {
+  if (solver_.factor().spread_numbers() != nullptr) return true;  // it has no numbers to round
+  SharedItems once;
+  once.count = 1;
+  once.work = [&](std::int64_t, int) {
+    const SelectedSolverOf<float> solver(solver_.factor(), sharing_.jobs());
+    SelectedSolverOf<float>::Workspace workspace;
+    const FloatRows f = load_.rightCols(checks).cast<float>();
+    FloatRows u(f.rows(), f.cols());
+    solver.multiply(stored_dofs_, checks, {f.data(), at(f.size())}, workspace, {u.data(), at(u.size())});
+    const Eigen::VectorXd rows = weighed_rows(response_.rightCols(checks) - u.cast<double>());
+    single_error_ = 0.0;
+    for (Index c = matrix_.tree.first_leaf(); c < matrix_.tree.clusters(); ++c) {
+      const std::int64_t first = first_dof(matrix_, c), count = end_dof(matrix_, c) - first;
+      single_error_ = std::max(single_error_, rows.segment(first, count).norm() / std::sqrt(double(count)));
+    }
+  };
+  once.carry = [&](std::int64_t, Parcel& results) { results.carry(single_error_); };
+  return sharing_.for_each(once);
+}
+
 bool Compression::prepare(const FetchNear& fetch) {
-  const bool whole = gather_near(fetch) && sample();
+  const bool whole = gather_near(fetch) && sample() && try_single();
   workspaces_ = {};  // what follows has its own
   return whole;
 }
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
+  const double cut_of_skeletons = skeleton_share * cut;
+  const bool single = single_error_ <= single_share * cut_of_skeletons;
   std::optional<HierarchicalMatrix> matrix =
-      with_far_pairs({solver_, stored_dofs_, matrix_, root_, load_, response_}, skeleton_share * cut,
+      with_far_pairs({solver_, single, stored_dofs_, matrix_, root_, load_, response_}, cut_of_skeletons,
                      sharing_, [&](double share) { return progress_(CompressionStage::far, share); });
   if (matrix) matrix = recompressed(*std::move(matrix), cut, sharing_);
   if (!matrix || !check(*matrix)) return nullptr;
@@ -156,14 +195,7 @@ bool Compression::check(HierarchicalMatrix& matrix) {
   if (!sharing_.for_each(loads)) return false;
   DoubleRows missing(matrix.order(), checks);
   for (Index k = 0; k < checks; ++k) missing.col(k) = response_.col(random_loads + k) - displaced[at(k)];
-  std::vector<double> squared(at(matrix.tree.leaves()));
-  parallel_for(matrix.tree.leaves(), sharing_.jobs(), [&](std::int64_t leaf, int) {
-    const Index c = matrix.tree.first_leaf() + static_cast<Index>(leaf);
-    DoubleRows of_leaf = missing.middleRows(first_dof(matrix, c), end_dof(matrix, c) - first_dof(matrix, c));
-    root_of_leaf(matrix, static_cast<Index>(leaf)).triangularView<Eigen::Lower>().solveInPlace(of_leaf);
-    squared[at(leaf)] = of_leaf.squaredNorm() / double(checks);
-  });
-  const double measured = std::accumulate(squared.begin(), squared.end(), 0.0);
+  const double measured = weighed_rows(std::move(missing)).squaredNorm();
   std::vector<double> of_pair(matrix.pair_error.size());
   for (std::size_t p = 0; p < of_pair.size(); ++p) {
     const std::span entries(matrix.coupling.get() + matrix.coupling_at[p],
@@ -211,11 +243,17 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
   return flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
 }
 
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame,
-                                   std::int64_t columns) {
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
   const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
-  columns = std::max({columns, frame.dimension * leaf, static_cast<std::int64_t>(columns_at_once)});
-  return SelectedSolver(factor).workspace_bytes(columns);
+  return SelectedSolver(factor).workspace_bytes(
+      std::max(frame.dimension * leaf, static_cast<std::int64_t>(columns_at_once<double>)));
+}
+
+std::int64_t inverted_bytes(const Factor& factor) {
+  const SupernodalTree tree(factor);
+  std::int64_t entries = 0;
+  for (const Supernode& s : tree.supernodes()) entries += s.columns * s.columns;
+  return entries * std::int64_t{sizeof(double)};
 }
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -63,15 +64,18 @@ class Compression {
   void solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace);
   bool gather_near(const FetchNear& fetch);
   bool sample();
+  bool try_single();
   bool check(HierarchicalMatrix& matrix);
+  [[nodiscard]] Eigen::VectorXd weighed_rows(DoubleRows u) const;
 
   SelectedSolver solver_;
   std::span<const std::int64_t> stored_dofs_;
   Sharing& sharing_;
   CompressionProgress progress_;
-  HierarchicalMatrix matrix_;   // without far pairs
-  Eigen::VectorXd root_;        // [order] root of D, 0 where held
-  DoubleRows response_, load_;  // [order x (random_loads + checks)]
+  HierarchicalMatrix matrix_;                                      // without far pairs
+  Eigen::VectorXd root_;                                           // [order] root of D, 0 where held
+  DoubleRows response_, load_;                                     // [order x (random_loads + checks)]
+  double single_error_ = std::numeric_limits<double>::infinity();  // [-] of a leaf, root mean square
   std::vector<SelectedSolver::Workspace> workspaces_;
 };
 
@@ -82,8 +86,10 @@ HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension)
 double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dofs,
                   const HierarchicalMatrix& frame);
 
-/// Memory of one thread [byte], for solves of at least so many columns beside its own.
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame,
-                                   std::int64_t columns);
+/// Memory of one thread [byte].
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame);
+
+/// Memory of the factor's diagonal blocks, inverted [byte].
+std::int64_t inverted_bytes(const Factor& factor);
 
 }  // namespace palpate

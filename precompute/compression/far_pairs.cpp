@@ -64,9 +64,11 @@ Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
 class FarPairs {
  public:
   FarPairs(const FarSource& source, Sharing& sharing)
-      : source_(source), frame_(source.frame), sharing_(sharing), workspaces_(at(sharing.jobs())) {}
+      : source_(source), frame_(source.frame), sharing_(sharing) {}
 
-  bool climb(double cut, const std::function<bool(double)>& done);
+  /// Bases and couplings, whose solves are by `solver`. False where `done` or the sharing said stop.
+  template <class Real>
+  bool climb(const SelectedSolverOf<Real>& solver, double cut, const std::function<bool(double)>& done);
   /// Bases and couplings, one after the other.
   HierarchicalMatrix packed();
 
@@ -80,6 +82,13 @@ class FarPairs {
     /// L the Cholesky factors of the leaves.
     Eigen::MatrixXd W;
     Eigen::MatrixXd V;  ///< V of a leaf; of other clusters E of both children, one below the other
+  };
+
+  /// A solver, and the scratch of each thread.
+  template <class Real>
+  struct Solves {
+    const SelectedSolverOf<Real>& solver;
+    std::vector<typename SelectedSolverOf<Real>::Workspace> workspaces;
   };
 
   std::span<const HierarchicalMatrix::Pair> partners(Index c) const {
@@ -98,11 +107,13 @@ class FarPairs {
   Front joined_front(Index c);
   void thin_out(Index c, double cut, Front& front) const;
   void check_rank(Index c) const;
-  std::vector<Index> groups_of(Index first, Index clusters) const;
+  std::vector<Index> groups_of(Index first, Index clusters, std::size_t most) const;
   std::vector<Index> needed_of_level(int level) const;
   bool make_fronts(int level, double cut, const std::function<bool(double)>& done);
-  bool make_couplings(int level, const std::function<bool(double)>& done);
-  void couple(Index first, Index end, SelectedSolver::Workspace& workspace);
+  template <class Real>
+  bool make_couplings(int level, Solves<Real>& solves, const std::function<bool(double)>& done);
+  template <class Real>
+  void couple(Index first, Index end, int worker, Solves<Real>& solves);
   void take_off(Index c);
 
   const FarSource& source_;
@@ -111,7 +122,6 @@ class FarPairs {
   std::vector<bool> needed_;         // [clusters]
   std::vector<Front> fronts_;        // [clusters]
   std::vector<FloatRows> coupling_;  // [far pairs]
-  std::vector<SelectedSolver::Workspace> workspaces_;
 };
 
 /// Front of a leaf: all its dofs, with the response to loads on its neighbours subtracted.
@@ -193,13 +203,14 @@ std::vector<Index> FarPairs::needed_of_level(int level) const {
   return clusters;
 }
 
-/// Starts of the groups of clusters of a level that are solved together, and the end of the last one.
-std::vector<Index> FarPairs::groups_of(Index first, Index clusters) const {
+/// Starts of the groups of clusters of a level that are solved together, with at most so many columns or
+/// those of one cluster, and the end of the last one.
+std::vector<Index> FarPairs::groups_of(Index first, Index clusters, std::size_t most) const {
   std::vector<Index> starts = {first};
   std::size_t columns = 0;
   for (Index c = first; c < first + clusters; ++c) {
     columns += fronts_[at(c)].skeleton.size();
-    if (columns <= columns_at_once || c == starts.back()) continue;
+    if (columns <= most || c == starts.back()) continue;
     starts.push_back(c);
     columns = fronts_[at(c)].skeleton.size();
   }
@@ -209,7 +220,8 @@ std::vector<Index> FarPairs::groups_of(Index first, Index clusters) const {
 
 /// Computes the couplings of the far pairs with the clusters [first, end) as columns: adjacent in the body,
 /// they have most of a solve in common.
-void FarPairs::couple(Index first, Index end, SelectedSolver::Workspace& workspace) {
+template <class Real>
+void FarPairs::couple(Index first, Index end, int worker, Solves<Real>& solves) {
   Dofs columns, rows;
   std::map<Index, std::int64_t> row_of;  // first row of a cluster's skeleton
   for (Index c = first; c < end; ++c) {
@@ -220,15 +232,17 @@ void FarPairs::couple(Index first, Index end, SelectedSolver::Workspace& workspa
       rows.insert(rows.end(), fronts_[at(row)].skeleton.begin(), fronts_[at(row)].skeleton.end());
     }
   }
-  DoubleRows block(std::ssize(rows), std::ssize(columns));
-  source_.solver.solve(dofs_of(rows), dofs_of(columns), workspace, {block.data(), at(block.size())});
+  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(std::ssize(rows),
+                                                                             std::ssize(columns));
+  solves.solver.solve(dofs_of(rows), dofs_of(columns), solves.workspaces[at(worker)],
+                      {block.data(), at(block.size())});
   std::int64_t column = 0;
   for (Index c = first; c < end; ++c) {
     const auto width = std::ssize(fronts_[at(c)].skeleton);
     for (const auto& [row, pair] : partners(c)) {
       if (row > c)
-        coupling_[at(pair)] =
-            block.block(row_of[row], column, std::ssize(fronts_[at(row)].skeleton), width).cast<float>();
+        coupling_[at(pair)] = block.block(row_of[row], column, std::ssize(fronts_[at(row)].skeleton), width)
+                                  .template cast<float>();
     }
     column += width;
   }
@@ -285,12 +299,14 @@ void FarPairs::check_rank(Index c) const {
 }
 
 /// Computes the couplings of the far pairs of a level.
-bool FarPairs::make_couplings(int level, const std::function<bool(double)>& done) {
-  const std::vector<Index> starts = groups_of(frame_.tree.first_of_level(level), Index{1} << level);
+template <class Real>
+bool FarPairs::make_couplings(int level, Solves<Real>& solves, const std::function<bool(double)>& done) {
+  const std::vector<Index> starts =
+      groups_of(frame_.tree.first_of_level(level), Index{1} << level, columns_at_once<Real>);
   SharedItems groups;
   groups.count = std::ssize(starts) - 1;
   groups.work = [&](std::int64_t group, int worker) {
-    couple(starts[at(group)], starts[at(group + 1)], workspaces_[at(worker)]);
+    couple(starts[at(group)], starts[at(group + 1)], worker, solves);
   };
   groups.carry = [&](std::int64_t group, Parcel& results) {
     for (Index c = starts[at(group)]; c < starts[at(group + 1)]; ++c)
@@ -301,7 +317,11 @@ bool FarPairs::make_couplings(int level, const std::function<bool(double)>& done
   return sharing_.for_each(groups);
 }
 
-bool FarPairs::climb(double cut, const std::function<bool(double)>& done) {
+template <class Real>
+bool FarPairs::climb(const SelectedSolverOf<Real>& solver, double cut,
+                     const std::function<bool(double)>& done) {
+  Solves<Real> solves{solver, {}};
+  solves.workspaces.resize(at(sharing_.jobs()));
   const ClusterTree& tree = frame_.tree;
   fronts_.assign(at(tree.clusters()), {});
   coupling_.assign(frame_.far_pair.size(), {});
@@ -321,7 +341,8 @@ bool FarPairs::climb(double cut, const std::function<bool(double)>& done) {
     const auto told = [&](double from, double to) {
       return [&, from, to](double part) { return done(std::lerp(share(from), share(to), part)); };
     };
-    if (!make_fronts(level, cut, told(0.0, front_share)) || !make_couplings(level, told(front_share, 1.0)))
+    if (!make_fronts(level, cut, told(0.0, front_share)) ||
+        !make_couplings(level, solves, told(front_share, 1.0)))
       return false;
     begun += clusters;
     if (level == tree.levels) continue;
@@ -376,8 +397,10 @@ std::span<const HierarchicalMatrix::Pair> neighbours(const HierarchicalMatrix& m
 std::optional<HierarchicalMatrix> with_far_pairs(const FarSource& source, double cut, Sharing& sharing,
                                                  const std::function<bool(double)>& done) {
   FarPairs pairs(source, sharing);
-  if (!pairs.climb(cut, done)) return {};
-  return pairs.packed();
+  const Factor& factor = source.solver.factor();
+  const bool whole = source.single ? pairs.climb(SelectedSolverOf<float>(factor, sharing.jobs()), cut, done)
+                                   : pairs.climb(source.solver, cut, done);
+  return whole ? std::optional(pairs.packed()) : std::nullopt;
 }
 
 }  // namespace palpate

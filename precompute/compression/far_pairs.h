@@ -29,12 +29,14 @@ std::span<const HierarchicalMatrix::Pair> neighbours(const HierarchicalMatrix& m
 /// Number of random loads, which act on the whole body.
 inline constexpr Index random_loads = 256;
 
-/// Columns of couplings that are solved together, or those of one cluster.
-inline constexpr std::size_t columns_at_once = 200;
+/// Columns of couplings that are solved together, or those of one cluster; as much memory in both precisions.
+template <class Real>
+inline constexpr std::size_t columns_at_once = 800 / sizeof(Real);
 
 /// Data from which far pairs are found.
 struct FarSource {
   const SelectedSolver& solver;
+  bool single;                                ///< couplings are solved for in single precision
   std::span<const std::int64_t> stored_dofs;  ///< [d N] of K, -1 where held
   const HierarchicalMatrix& frame;            ///< tree and pairs, with the near ones
   const Eigen::VectorXd& root;                ///< [d N] of the diagonal, 0 where held

@@ -22,7 +22,7 @@ namespace palpate {
 /// threads may compute blocks.
 class GreensSolver {
  public:
-  using Workspace = SupernodalSweeps::Workspace;  ///< scratch of one thread
+  using Workspace = SupernodalSweeps<double>::Workspace;  ///< scratch of one thread
 
   /// `factor` may be only analysed as long as only sizes and costs are queried. `stored` [n] marks the dofs
   /// of K whose rows and columns are requested, all or none of a node; `mesh_dofs` [n] are their dofs of the
@@ -56,7 +56,7 @@ class GreensSolver {
   void mark_paths(std::span<const std::int64_t> block, std::vector<std::uint8_t>& on_path) const;
   [[nodiscard]] bool needed(std::size_t supernode, std::int64_t first_position) const noexcept;
 
-  SupernodalSweeps sweeps_;
+  SupernodalSweeps<double> sweeps_;
   std::vector<std::int64_t> last_stored_;  // [supernodes] largest stored position <= its last column, or -1
   std::vector<std::int64_t> positions_;    // ascending positions in the factor of the free stored dofs
   std::vector<std::int64_t> place_;        // [order] index of a stored dof in positions_, -1 if held

@@ -25,7 +25,7 @@ class EntriesBySupernode {
     double value;
   };
 
-  EntriesBySupernode(const SupernodalSweeps& tree, const SparseMatrix& A) {
+  EntriesBySupernode(const SupernodalTree& tree, const SparseMatrix& A) {
     const std::span<const std::int64_t> order = tree.factor().permutation();
     std::vector<std::int64_t> position(order.size());
     for (std::size_t p = 0; p < order.size(); ++p)
@@ -101,7 +101,7 @@ std::int64_t eliminate(Matrix& F, std::int64_t columns) {
 }  // namespace
 
 std::int64_t negative_pivots(const Factor& analysed, const SparseMatrix& A) {
-  const SupernodalSweeps tree(analysed);
+  const SupernodalTree tree(analysed);
   const EntriesBySupernode entries(tree, A);
   const std::span<const Supernode> supernodes = tree.supernodes();
   std::vector<std::vector<std::size_t>> children(supernodes.size());
@@ -136,7 +136,7 @@ std::int64_t negative_pivots(const Factor& analysed, const SparseMatrix& A) {
 }
 
 std::int64_t inertia_bytes(const Factor& analysed) {
-  const SupernodalSweeps tree(analysed);
+  const SupernodalTree tree(analysed);
   const std::span<const Supernode> supernodes = tree.supernodes();
   std::vector<std::int64_t> of_children(supernodes.size(), 0);
   std::int64_t waiting = 0, largest = 0;

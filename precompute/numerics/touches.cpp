@@ -48,22 +48,22 @@ Matrix touch_displacements(std::span<const Vec3> arms, int d, std::mt19937_64& r
   return u;
 }
 
+double force_error(const Refined& f, const Refined& f_0, int d) {
+  double worst = 0.0;
+  for (Eigen::Index k = 0; k < f.cols(); ++k) {
+    const double error = largest_force(f.col(k) - f_0.col(k), d) / largest_force(f_0.col(k), d);
+    worst = std::isnan(error) ? infinity : std::max(worst, error);
+  }
+  return worst;
+}
+
 double touch_error(const Refined& reference_C, const Matrix& C, const Matrix& u, int d) {
   const Eigen::Index size = u.rows();
   const Refined A = reference_C.topLeftCorner(size, size);
   const Eigen::LLT<Matrix> reference(A.cast<double>());
   const Eigen::LLT<Matrix> stored(C.topLeftCorner(size, size));
   if (reference.info() != Eigen::Success || stored.info() != Eigen::Success) return infinity;
-  const Refined f_0 = solve_refined(reference, A, u);
-  const Matrix f = stored.solve(u);
-  double worst = 0.0;
-  for (Eigen::Index k = 0; k < u.cols(); ++k) {
-    const Eigen::Matrix<long double, Eigen::Dynamic, 1> difference =
-        f.col(k).cast<long double>() - f_0.col(k);
-    const double error = largest_force(difference, d) / largest_force(f_0.col(k), d);
-    worst = std::isnan(error) ? infinity : std::max(worst, error);
-  }
-  return worst;
+  return force_error(stored.solve(u).cast<long double>(), solve_refined(reference, A, u), d);
 }
 
 }  // namespace palpate

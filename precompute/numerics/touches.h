@@ -17,6 +17,10 @@ double uniform(std::mt19937_64& random);
 /// random. `arms` [m] are the nodes' positions relative to the first [m].
 Eigen::MatrixXd touch_displacements(std::span<const Vec3> arms, int d, std::mt19937_64& random);
 
+/// max |f - f_0| / max |f_0| over the nodes of a touch, the largest of its displacements [d m,
+/// displacements].
+double force_error(const RefinedSolution::Refined& f, const RefinedSolution::Refined& f_0, int d);
+
 /// max |f - f_0| / max |f_0| over the nodes and displacements, with f = C^-1 u and f_0 = reference^-1 u;
 /// infinity if C is not positive definite. For the nodes of u, the first ones of both matrices.
 double touch_error(const RefinedSolution::Refined& reference, const Eigen::MatrixXd& C,

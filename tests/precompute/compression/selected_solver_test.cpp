@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -150,6 +151,40 @@ TEST(SelectedSolver, BodyCutInTwoByAClampedSlice) {
   EXPECT_EQ(body.solved(left, right, workspace), Rows::Zero(std::ssize(left), std::ssize(right)));
   EXPECT_EQ(body.solved(right, left, workspace), Rows::Zero(std::ssize(right), std::ssize(left)));
   body.expect_block(left, body.all(), workspace);
+}
+
+// Rounded once, and then in every step: off by some roundings of the largest entry, not by the condition of
+// K.
+TEST(SelectedSolver, InSinglePrecisionIsRounded) {
+  const Body body(block().hold(at_bottom, 7));
+  const SelectedSolverOf<float> single(body.factor), by_three(body.factor, 3);
+  SelectedSolverOf<float>::Workspace workspace;
+  using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  std::mt19937_64 random(8);
+  for (int k = 0; k < 10; ++k) {
+    const Dofs rows = body.some(1 + random() % 200, random), columns = body.some(1 + random() % 90, random);
+    for (std::vector<float>* stale : {&workspace.sweep.X, &workspace.sweep.below})
+      std::fill(stale->begin(), stale->end(), std::numeric_limits<float>::quiet_NaN());
+    FloatRows block(std::ssize(rows), std::ssize(columns)), again = block;
+    single.solve(rows, columns, workspace, {block.data(), static_cast<std::size_t>(block.size())});
+    by_three.solve(rows, columns, workspace, {again.data(), static_cast<std::size_t>(again.size())});
+    EXPECT_EQ(block, again);
+    EXPECT_LT((block.cast<double>() - body.expected(rows, columns)).cwiseAbs().maxCoeff(),
+              1e-5 * body.inverse.cwiseAbs().maxCoeff());
+
+    const Dofs dofs = [&] {  // each once
+      Dofs some = body.all();
+      std::shuffle(some.begin(), some.end(), random);
+      some.resize(50);
+      return some;
+    }();
+    const FloatRows f =
+        FloatRows::NullaryExpr(50, 3, [&] { return static_cast<float>(random() % 100) - 50.0F; });
+    FloatRows u(50, 3);
+    single.multiply(dofs, 3, {f.data(), 150}, workspace, {u.data(), 150});
+    const Rows u_0 = body.expected(dofs, dofs) * f.cast<double>();
+    EXPECT_LT((u.cast<double>() - u_0).cwiseAbs().maxCoeff(), 1e-4 * u_0.cwiseAbs().maxCoeff());
+  }
 }
 
 TEST(SelectedSolver, MoreRowsOrColumnsAreNotFewerFlops) {
