@@ -244,7 +244,9 @@ void make_anew(const std::filesystem::path& temporary) {
 }
 
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (std::rename(from.c_str(), to.c_str()) != 0) fail("rename " + from.string(), to, errno);
+  std::error_code failed;
+  std::filesystem::rename(from, to, failed);
+  if (failed) fail("rename " + from.string(), to, failed.value());
 }
 
 bool rename_new(const std::filesystem::path& from, const std::filesystem::path& to) {

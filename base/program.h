@@ -37,7 +37,7 @@ void end_with_an_error_on_shrunk_files();
 template <typename T>
 decltype(auto) as_printed(const T& value) {
   if constexpr (std::is_same_v<T, std::filesystem::path>) {
-    return printable(value.native());
+    return printable(value.string());
   } else if constexpr (std::is_convertible_v<const T&, std::string_view>) {
     return printable(value);
   } else {

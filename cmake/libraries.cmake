@@ -96,8 +96,10 @@ function(palpate_show_headers target visibility folder)
 endfunction()
 
 # Of all programs and libraries: what the loader has resolved cannot be written over, the stack and known sizes are watched.
-add_link_options(LINKER:-z,relro,-z,now)
-if(NOT PALPATE_SANITIZE)
+if(NOT WIN32)
+  add_link_options(LINKER:-z,relro,-z,now)
+endif()
+if(NOT PALPATE_SANITIZE AND NOT WIN32)
   add_compile_options(-fstack-protector-strong "$<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=2>")
   set(PALPATE_UNWATCHED -fno-stack-protector SHELL:-U_FORTIFY_SOURCE)  # for kernels; CMake drops a flag that was there before, but for SHELL:
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")

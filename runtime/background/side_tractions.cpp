@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <numeric>
 
 namespace palpate {
 namespace {
 
-const double smooth = std::cos(M_PI / 6.0);  // cosine of the largest angle between adjacent facets of a side
-constexpr double shear_cost = 100.0;         // relative to pressure, when a force is distributed
-constexpr int most_rounds = 5;               // on most bodies all edges are done, with short rows
-constexpr std::size_t most_alone = 3;        // sides treated separately among those without inner nodes
+/// Cosine of the largest angle between adjacent facets of a side.
+const double smooth = std::cos(std::numbers::pi / 6.0);
+constexpr double shear_cost = 100.0;   // relative to pressure, when a force is distributed
+constexpr int most_rounds = 5;         // on most bodies all edges are done, with short rows
+constexpr std::size_t most_alone = 3;  // sides treated separately among those without inner nodes
 
 std::size_t index(Index number) {
   return static_cast<std::size_t>(number);

@@ -335,6 +335,9 @@ int palpate_record(palpate_session* session, const char* file, const palpate_rec
   return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
     const Inside<OwnLoop> inside(session, Use::alone);
     OwnLoop& loop = expect(inside, session, place, code);
+#ifdef _WIN32
+    throw Error("recordings are not written on Windows", place, "record on Linux");
+#endif
     if (file == nullptr) throw Error("there is no file name", place, "name the recording, OUT.mcap");
     if (options == nullptr)
       throw Error("there are no options", place, "begin with PALPATE_RECORD_OPTIONS_INIT");

@@ -252,7 +252,7 @@ typedef struct palpate_record_options {
  * `palpate-runtime play BODY --device replay:OUT.mcap` repeats every tick to the last bit. options.tick must
  * be 1/rate of a whole rate from 1000 to 5000 ticks per second. Threads of the session write; palpate_step
  * stays real-time safe. The file is a valid recording at any time. Returns PALPATE_OK, or a code with the
- * reason in `error` as in palpate_create. */
+ * reason in `error` as in palpate_create. On Windows refuses. */
 int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
                    char* error, size_t error_size) PALPATE_NOEXCEPT;
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "runtime/core/solve/nearest_on_disc.h"
@@ -176,7 +177,7 @@ std::size_t pairs_over_rim(const SurfaceTree& tree, const SimplexNodes& nodes, c
 
 TouchingPair pair_on_rim(const ElasticBody& body, const SurfaceTree& tree, Index simplex, const Core& core,
                          int place) noexcept {
-  const double angle = 2.0 * M_PI * place / places_on_rim;
+  const double angle = 2.0 * std::numbers::pi * place / places_on_rim;
   const Vec3 outward = std::cos(angle) * core.diameter + std::sin(angle) * core.axis.cross(core.diameter);
   const SimplexNodes nodes = nodes_of(body, simplex);
   return make_pair(tree, nodes, simplex, 4 + place,
