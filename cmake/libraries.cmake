@@ -57,14 +57,20 @@ macro(palpate_use_core_headers)
   set(PALPATE_KERNEL_HEADERS palpate_core_kernel_headers)
 endmacro()
 
-# palpate_library(NAME SOURCES a.cpp ... [KERNELS k.cpp ...] [LIBS lib ...] [PRIVATE lib ...]): the library of the folder that calls it. Who links it
-# can include the folder's headers, as "FOLDER/x.h", and those of LIBS; the headers of no other folder can be found at all.
+# palpate_library(NAME [SHELL] SOURCES a.cpp ... [KERNELS k.cpp ...] [LIBS lib ...] [PRIVATE lib ...]): the library of the folder that calls it. SHELL:
+# its sources wait for people, disks and networks (palpate_shell_options). Who links it can include the folder's headers, as "FOLDER/x.h", and those of
+# LIBS; the headers of no other folder can be found at all.
 function(palpate_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;KERNELS;LIBS;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "SHELL" "" "SOURCES;KERNELS;LIBS;PRIVATE" ${ARGN})
   if(ARG_SOURCES OR ARG_KERNELS)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC palpate_options ${ARG_LIBS} PRIVATE ${ARG_PRIVATE})
-    target_precompile_headers(${name} REUSE_FROM ${PALPATE_HEADERS})
+    if(ARG_SHELL)
+      target_link_libraries(${name} PRIVATE palpate_shell_options)
+      target_precompile_headers(${name} REUSE_FROM palpate_shell_headers)
+    else()
+      target_precompile_headers(${name} REUSE_FROM ${PALPATE_HEADERS})
+    endif()
     palpate_show_headers(${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
   else()
     add_library(${name} INTERFACE)
@@ -107,6 +113,11 @@ if(NOT PALPATE_SANITIZE AND NOT WIN32)
     list(APPEND PALPATE_UNWATCHED -fno-stack-clash-protection -fcf-protection=none)
   endif()
 endif()
+
+# Shells take longer to compile than ever to run. Outside of kernels no optimisation rounds otherwise than another. A precompiled header brings its level
+# of optimisation along: theirs is their own.
+add_library(palpate_shell_options INTERFACE)
+target_compile_options(palpate_shell_options INTERFACE "$<$<CONFIG:Release>:-O1>")
 
 # The kernels: vectorised loops with fused multiply-add, as fast as memory, in every build that is not for the debugger. They see only sizes
 # that were checked at load, no text and no bytes from outside, so that stack and sizes are watched around them and not in them. To be linked

@@ -55,7 +55,8 @@ class PageConnection : public Connection, public Page {
   void note_picture(const Message& message);
   void wait_for_picture();
 
-  std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
+  // false: without compression, which nothing turned on
+  std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream, false>> socket_;
   const Served& served_;
   ShownRun* run_ = nullptr;  // that it asks for; null before it has shown the token
 
