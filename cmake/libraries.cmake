@@ -45,16 +45,12 @@ function(palpate_shared_headers name)
     <functional> <map> <memory> <mutex> <optional> <span> <string> <thread> <vector> ${ARG_HEADERS})
 endfunction()
 
-# Those that runtime/core and what it stands on include: of the standard library and Eigen alone.
-macro(palpate_core_headers)
-  palpate_shared_headers(palpate_core_headers)
-  palpate_shared_headers(palpate_core_kernel_headers LIBS palpate_kernel_options)
-endmacro()
-
-# Libraries of the folder that calls it, and below, take these.
-macro(palpate_use_core_headers)
-  set(PALPATE_HEADERS palpate_core_headers)
-  set(PALPATE_KERNEL_HEADERS palpate_core_kernel_headers)
+# palpate_headers_of_all([HEADERS <x.h> ...]): those of all libraries, and once more for kernels.
+macro(palpate_headers_of_all)
+  palpate_shared_headers(palpate_headers ${ARGN})
+  palpate_shared_headers(palpate_kernel_headers LIBS palpate_kernel_options ${ARGN})
+  set(PALPATE_HEADERS palpate_headers)
+  set(PALPATE_KERNEL_HEADERS palpate_kernel_headers)
 endmacro()
 
 # palpate_library(NAME [SHELL] SOURCES a.cpp ... [KERNELS k.cpp ...] [LIBS lib ...] [PRIVATE lib ...]): the library of the folder that calls it. SHELL:
