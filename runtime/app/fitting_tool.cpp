@@ -48,7 +48,8 @@ std::string too_small(const Tool& tool, const Body& body) {
 }
 
 void tell_small_tool(const std::string& note) {
-  if (!note.empty()) say(stderr, "{}; a larger tool, --overlay auto, a finer mesh or tet10 are truer\n", note);
+  if (!note.empty())
+    say(stderr, "{}; a larger tool, --overlay auto, a finer mesh or tet10 are truer\n", note);
 }
 
 void settle_tool(PlayOptions& options, const Body& body) {
