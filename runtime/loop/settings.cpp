@@ -240,10 +240,11 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                 s.stiffness_scale != 1.0},
         s.stiffness_scale);
   visit(Setting{"overlay", group, "auto|r=R,rings=N", "", "none",
-                fmt::format("a finer mesh under the tool (s-FEM): auto, one that is graded by the tool's radius, "
-                            "round and quadratic, if the body's is too coarse for it; or each element within N "
-                            "rings, from 1 to {}, cut into R to the power of the dimension, R from {} to {}",
-                            most_rings, least_refinement, most_refinement),
+                fmt::format(
+                    "a finer mesh under the tool (s-FEM): auto, one that is graded by the tool's radius, "
+                    "round and quadratic, if the body's is too coarse for it; or each element within N "
+                    "rings, from 1 to {}, cut into R to the power of the dimension, R from {} to {}",
+                    most_rings, least_refinement, most_refinement),
                 any_number, s.overlay.has_value()},
         s.overlay);
   visit(Setting{"overlay-law", group, "linear|neo-hookean", "", "linear",
