@@ -99,7 +99,7 @@ struct MaterialPart {
 };
 
 /// Force on each of some nodes [N].
-struct NodalForce {
+struct ConcentratedForce {
   Vec3 force;
   Selection where;
 };
@@ -113,7 +113,7 @@ struct Traction {
 struct Gravity {
   Vec3 acceleration;
 };
-using Load = std::variant<NodalForce, Traction, Gravity>;
+using Load = std::variant<ConcentratedForce, Traction, Gravity>;
 
 /// Overlays condensed in advance: one around each surface node in the regions.
 struct OverlayRegions {

@@ -66,7 +66,7 @@ Load read_load(const TomlTable& entry, int dimension) {
   if (kind == "traction") {
     return Traction{value, where};
   }
-  return NodalForce{value, where};
+  return ConcentratedForce{value, where};
 }
 
 }  // namespace

@@ -114,7 +114,7 @@ std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, 
   if (plan.method == DynamicsMethod::packed) {
     result.matrices = mass_and_damping(K, M, options.damping, stored_dofs);
   } else {
-    std::optional<Modes> modes = lowest_modes(factor, K, M, plan.modes, stopped);
+    std::optional<LowestModes> modes = lowest_modes(factor, K, M, plan.modes, stopped);
     if (!modes) return {};
     result.omega = std::move(modes->omega);
     result.shapes = at_stored_dofs(modes->shapes, stored_dofs);

@@ -36,7 +36,7 @@ class Loader {
   }
 
  private:
-  void add(const NodalForce& load, const std::string& where) const {
+  void add(const ConcentratedForce& load, const std::string& where) const {
     const std::vector<std::uint8_t> selected = select_nodes(mesh_, load.where, where);
     for (std::size_t node = 0; node < selected.size(); ++node) {
       if (selected[node] != 0) f_[node] += load.force;

@@ -76,13 +76,13 @@ void normalize(Eigen::MatrixXd& shapes, const SparseMatrix& M) {
   }
 }
 
-Modes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count) {
+LowestModes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count) {
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(K),
                                                                          Eigen::MatrixXd(M)};
   if (solver.info() != Eigen::Success)
     throw Error("the dense eigenvalue problem has no solution", "[dynamics] modes",
                 "Look at the worst element of the mesh and at the densities");
-  Modes modes;
+  LowestModes modes;
   for (std::int64_t i = 0; i <= count; ++i)
     modes.omega.push_back(i < K.rows() ? std::sqrt(solver.eigenvalues()[i])
                                        : std::numeric_limits<double>::infinity());
@@ -92,8 +92,8 @@ Modes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count
 
 /// With one starting vector a second mode of the same frequency comes in by rounding alone, so a larger basis
 /// may find what a smaller one has left out.
-Modes lanczos(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M, std::int64_t count,
-              const std::function<bool()>& stopped) {
+LowestModes lanczos(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M, std::int64_t count,
+                    const std::function<bool()>& stopped) {
   InverseOfK inverse(factor, stopped);
   ProductWithM product(M);
   const std::int64_t wanted = count + 1;
@@ -105,7 +105,7 @@ Modes lanczos(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M
                                           Spectra::SortRule::SmallestAlge) == wanted;
     if (converged && solver.eigenvalues().minCoeff() > 0.0) {
       const Vector omega = solver.eigenvalues().cwiseSqrt();
-      Modes modes{{omega.begin(), omega.end()}, solver.eigenvectors(wanted).leftCols(count)};
+      LowestModes modes{{omega.begin(), omega.end()}, solver.eigenvectors(wanted).leftCols(count)};
       if (none_left_out(factor, K, M, modes.omega)) return modes;
     }
     if (basis == K.rows())
@@ -126,10 +126,10 @@ std::int64_t modes_bytes(std::int64_t count, std::int64_t dofs) noexcept {
   return dofs * (basis_size(count + 1, dofs) + 2 * count) * scalar;
 }
 
-std::optional<Modes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
-                                  std::int64_t count, const std::function<bool()>& stopped) {
+std::optional<LowestModes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
+                                        std::int64_t count, const std::function<bool()>& stopped) {
   try {
-    Modes modes =
+    LowestModes modes =
         dense_modes(count, K.rows()) ? all_modes(K, M, count) : lanczos(factor, K, M, count, stopped);
     normalize(modes.shapes, M);
     return modes;

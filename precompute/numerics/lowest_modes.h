@@ -12,7 +12,7 @@
 namespace palpate {
 
 /// Lowest solutions of K phi = omega^2 M phi.
-struct Modes {
+struct LowestModes {
   std::vector<double> omega;  ///< [k + 1] angular frequencies [rad/s], ascending; the last is that of the
                               ///< first mode not among the shapes, infinity if there is none
   Eigen::MatrixXd shapes;     ///< [n, k] at the dofs of K, phi^T M phi = 1 [1/sqrt(kg)]; the entry of largest
@@ -32,8 +32,8 @@ std::int64_t modes_bytes(std::int64_t count, std::int64_t dofs) noexcept;
 /// are more than a third of all by a dense solver. `factor`: of K, computed. K and M: lower triangles. That
 /// none is left out is proved by Sylvester's law of inertia. `stopped` is asked before each solve; nothing
 /// once it is true. Throws Error where they cannot be found.
-std::optional<Modes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
-                                  std::int64_t count, const std::function<bool()>& stopped);
+std::optional<LowestModes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
+                                        std::int64_t count, const std::function<bool()>& stopped);
 
 /// Number of omega^2 below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). `analysed`: K.
 /// Throws Error if a pivot is zero.

@@ -77,6 +77,13 @@ class Rules(unittest.TestCase):
         self.write("base/part39.cpp", "")
         self.refused("base: 41 product files, of at most 40")
 
+    def test_two_types_of_one_name_are_refused(self):
+        self.write("base/shapes.h", "namespace palpate {\nstruct Shape {\n};\n}\n")
+        self.write("meshes/forms.h", "namespace palpate::forms {\nclass Shape {\n};\n}\n")
+        self.assertEqual(self.check()[0], 0)
+        self.write("meshes/bodies.h", "namespace palpate {\nclass Shape final : public Form {\n};\n}\n")
+        self.refused("palpate::Shape is a type of", "base/shapes.h", "meshes/bodies.h")
+
     def test_two_headers_of_one_name_are_refused(self):
         self.write("base/mesh.h", "")
         self.refused("base/mesh.h and meshes/mesh.h: two headers of one name")

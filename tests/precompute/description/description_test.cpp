@@ -142,8 +142,9 @@ precision = "double"
   EXPECT_EQ(d.fixed[1].axes, 0b101);
   EXPECT_EQ(d.fixed[1].displacement, Vec3(0.5, 0, -0.25));
   ASSERT_EQ(d.loads.size(), 3U);
-  EXPECT_EQ(std::get<NodalForce>(d.loads[0]).force, Vec3(1, 2, 3));
-  EXPECT_EQ(std::get<SelectNodes>(std::get<NodalForce>(d.loads[0]).where).nodes, std::vector<Index>{4});
+  EXPECT_EQ(std::get<ConcentratedForce>(d.loads[0]).force, Vec3(1, 2, 3));
+  EXPECT_EQ(std::get<SelectNodes>(std::get<ConcentratedForce>(d.loads[0]).where).nodes,
+            std::vector<Index>{4});
   EXPECT_EQ(std::get<Traction>(d.loads[1]).traction, Vec3(0, 0, -100));
   EXPECT_EQ(std::get<SelectLowest>(std::get<Traction>(d.loads[1]).where).axis, 1);
   EXPECT_EQ(std::get<Gravity>(d.loads[2]).acceleration, Vec3(0, 0, -9.81));

@@ -82,7 +82,7 @@ struct Body {
     factor.factorize();
   }
 
-  [[nodiscard]] Modes modes(std::int64_t count) const {
+  [[nodiscard]] LowestModes modes(std::int64_t count) const {
     return *lowest_modes(factor, stiffness.K, M, count, [] { return false; });
   }
 };
@@ -91,7 +91,7 @@ struct Body {
 void expect_modes(const Body& body, std::int64_t count) {
   const MatrixXd K = dense(body.stiffness.K), M = dense(body.M);
   const VectorXd squares = test::eigenvalues_of(K, M);
-  const Modes modes = body.modes(count);
+  const LowestModes modes = body.modes(count);
   ASSERT_EQ(std::ssize(modes.omega), count + 1);
   ASSERT_EQ(modes.shapes.cols(), count);
   for (std::int64_t i = 0; i <= count; ++i) {
@@ -198,7 +198,7 @@ TEST(Modes, TwiceTheSameFrequencyIsFoundTwice) {
   test::ElasticCase beam(test::block(ElementType::hex8, {0.2, 0.02, 0.02}, {16, 2, 2}), soft);
   const Body body(beam.hold(at_left, 7));
   expect_modes(body, 20);
-  const Modes modes = body.modes(2);
+  const LowestModes modes = body.modes(2);
   EXPECT_NEAR(modes.omega[1] / modes.omega[0], 1.0, 1e-9);
   EXPECT_EQ(modes_below(body.factor, body.stiffness.K, body.M, 0.5 * std::pow(modes.omega[0], 2)), 0);
   EXPECT_EQ(modes_below(body.factor, body.stiffness.K, body.M, 1.01 * std::pow(modes.omega[0], 2)), 2);
@@ -225,7 +225,7 @@ TEST(Modes, AFrequencyOfManyShapesIsFoundAsOften) {
   test::ElasticCase all(beams, soft);
   const Body body(all.hold(at_left, 7));
   expect_modes(body, 45);
-  const Modes modes = body.modes(20);
+  const LowestModes modes = body.modes(20);
   EXPECT_NEAR(modes.omega[19] / modes.omega[0], 1.0, 1e-9);
   EXPECT_GT(modes.omega[20] / modes.omega[0], 1.5);
 }
@@ -245,7 +245,7 @@ TEST(Modes, AreCountedBelowAnyFrequency) {
 TEST(Modes, AreTheSameAgainAndNoneWhereStopped) {
   test::ElasticCase beam(test::block(ElementType::hex8, {0.2, 0.02, 0.02}, {16, 2, 2}), soft);
   const Body body(beam.hold(at_left, 7));
-  const Modes expected = body.modes(30), modes = body.modes(30);
+  const LowestModes expected = body.modes(30), modes = body.modes(30);
   EXPECT_EQ(modes.omega, expected.omega);
   EXPECT_EQ(modes.shapes, expected.shapes);
   for (const int solve : {1, 2, 10, 50}) {
@@ -261,7 +261,7 @@ TEST(Modes, BarMovesAlongItselfAsItsClosedFormSays) {
   test::ElasticCase bar(test::block(ElementType::hex8, {length, 0.01, 0.01}, {64, 1, 1}),
                         {1.0e4, 0.0, 1100.0});
   const Body body(bar.hold([](const Vec3&) { return true; }, 6).hold(at_left, 7));
-  const Modes modes = body.modes(3);
+  const LowestModes modes = body.modes(3);
   for (int i = 1; i <= 3; ++i) {
     const double exact = (2 * i - 1) * std::acos(-1.0) / 2.0 * std::sqrt(1.0e4 / 1100.0) / length;
     // linear elements with a consistent mass: too stiff by (k h)^2 / 24
@@ -277,7 +277,7 @@ TEST(Dynamics, ModalIsWhatTheModesSayAtTheStoredDofs) {
   options.modes = 3;
   const StoredDynamics dynamics = test::make_dynamics(model, options, Precision::single_precision);
   const Body body(partly_held_block({ElementType::quad4, Analysis::plane_stress}));
-  const Modes modes = body.modes(3);
+  const LowestModes modes = body.modes(3);
   ASSERT_EQ(dynamics.modes(), 3);
   const std::vector<std::int64_t> dofs = stored_dofs_of(model, body.stiffness);
   for (std::size_t i = 0; i < 3; ++i) {

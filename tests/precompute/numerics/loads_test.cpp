@@ -237,8 +237,8 @@ TEST_P(LoadedKind, NodalForcesAreAddedAsTheyAre) {
   Loaded model = bar(GetParam());
   model.hold_on_rollers();
   const std::vector<Index> nodes = {3, 7};
-  model.description.loads = {NodalForce{{0.1, -0.2, 0.0}, SelectNodes{nodes}},
-                             NodalForce{{0.0, 0.5, 0.0}, SelectNodes{{7}}}};
+  model.description.loads = {ConcentratedForce{{0.1, -0.2, 0.0}, SelectNodes{nodes}},
+                             ConcentratedForce{{0.0, 0.5, 0.0}, SelectNodes{{7}}}};
   model.solve();
   EXPECT_EQ(model.loads[3], Vec3(0.1, -0.2, 0.0));
   EXPECT_EQ(model.loads[7], Vec3(0.1, 0.3, 0.0));
@@ -405,7 +405,7 @@ TEST_P(LoadedKind, EveryFreeNodeIsInEquilibriumUnderAllSortsOfLoads) {
   model.hold(face(0, size.x()), 1, -0.002);
   const Vec3 traction(120.0, -40.0, 0.0), acceleration(-2.0, 9.0, 0.0), nodal(0.02, 0.05, 0.0);
   model.description.loads = {Traction{traction, face(1, size.y())}, Gravity{acceleration},
-                             NodalForce{nodal, SelectNodes{{5}}}};
+                             ConcentratedForce{nodal, SelectNodes{{5}}}};
   model.solve();
   double largest = 0.0, residual = 0.0;
   for (std::size_t node = 0; node < model.loads.size(); ++node) {
