@@ -57,13 +57,14 @@ class Bisection {
     }
   }
 
-  /// The cells that are left, and the number of their corners.
+  /// The cells that have not been cut.
   [[nodiscard]] std::vector<GradedCell> cells() const {
     std::vector<GradedCell> left;
     std::copy_if(cells_.begin(), cells_.end(), std::back_inserter(left),
                  [](const GradedCell& cell) { return cell.parent >= 0; });
     return left;
   }
+  /// Number of their corners.
   [[nodiscard]] Index corners() const { return static_cast<Index>(positions_.size()); }
 
  private:

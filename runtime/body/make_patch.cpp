@@ -102,11 +102,11 @@ void for_each_node_on(const Body& body, std::span<const Index> corners, int deno
   }
 }
 
-/// Weights of a point of a body's facet in terms of a part of it.
-Vec3 weights_in(const GradedFacet& part, const Vec3& weights, std::size_t corners) {
+/// Maps weights of a body's facet to those of a part of it.
+Mat3 weights_of_part(const GradedFacet& part, std::size_t corners) {
   Mat3 of_part = Mat3::Identity();
   for (std::size_t k = 0; k < corners; ++k) of_part.col(static_cast<Eigen::Index>(k)) = part.weights[k];
-  return of_part.partialPivLu().solve(weights);
+  return of_part.inverse();
 }
 
 }  // namespace
@@ -145,8 +145,9 @@ std::shared_ptr<const Patch> make_patch(const Body& body, const GradedMesh& mesh
   std::map<Index, Follower> followers;  // of surface nodes
   const int denominator = body.fine_surface().denominator;
   for (const GradedFacet& facet : mesh.facets) {
+    const Mat3 to_part = weights_of_part(facet, d);
     for_each_node_on(body, std::span(facet.corners).first(d), denominator, [&](Index node, const Vec3& at) {
-      const Vec3 weights = weights_in(facet, at, d);
+      const Vec3 weights = to_part * at;
       const double outside = -weights.head(static_cast<Eigen::Index>(d)).minCoeff();
       Follower& follower = followers[node];
       if (outside >= follower.outside) return;

@@ -195,18 +195,20 @@ TEST_P(Tick, MakesNoHeapCallWhereContactsAreMergedAndParted) {
   EXPECT_GT(changes, 1);
 }
 
-/// The same body with a finer surface, and patches that take turns.
+/// The same body with a finer surface, flat or rounded, and patches that take turns.
 class OverlayTick : public Tick {
  protected:
+  explicit OverlayTick(bool rounded = false) : rounded_(rounded) {}
   void SetUp() override {
     Tick::SetUp();
     for (std::size_t k = 0; k < poses_.size(); ++k) {
       const double height = k % 200 < 20 ? 1.1 : 1.04;
       poses_[k].position = test::upright(GetParam(), 0.2 + 0.001 * static_cast<double>(k % 50), 0.5, height);
     }
-    PatchMaker maker(overlaid_, 1);
+    PatchMaker maker(overlaid_, 1, finest_);
     for (const double x : {0.0, 0.3, 0.6}) {
-      const Index centre = overlaid_.nearest_surface_node(test::upright(GetParam(), x, 0.5, 1.0)).node;
+      const Index stored = overlaid_.nearest_surface_node(test::upright(GetParam(), x, 0.5, 1.0)).node;
+      const Index centre = rounded_ ? overlaid_.surface_node_of_stored(stored) : stored;
       patches_.push_back(maker.make({&centre, 1}));
     }
     patches_.push_back(nullptr);
@@ -227,10 +229,15 @@ class OverlayTick : public Tick {
 
   void exercise_beside(const PatchSourceOptions& options);
 
+  static constexpr double finest_ = 0.1;  // of rounded ones
+
+  bool rounded_;
   Body overlaid_{
       test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::full, Precision::double_precision),
       {},
-      3};
+      3,
+      ContactModel::quasi_static,
+      rounded_};
   Index room_ = patch_room(overlaid_, 1, 1);
   State with_{overlaid_, {.tools = {Tool{.radius = 0.05, .reach = 0.3}}, .patch_nodes = room_}};
   int touching_ = 0;
@@ -268,6 +275,30 @@ TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilder) {
 
 TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilderOfNeoHookeanPatches) {
   exercise_beside({.rings = 1, .law = PatchLaw::neo_hookean, .memory = 1 << 16});
+}
+
+class GradedTick : public OverlayTick {
+ protected:
+  GradedTick() : OverlayTick(true) {}
+};
+
+INSTANTIATE_TEST_SUITE_P(Dimension, GradedTick, testing::Values(3));
+
+TEST_P(GradedTick, MakesNoHeapCall) {
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  exercise_patches();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  exercise_patches();
+#endif
+  EXPECT_GT(touching_, 500);
+}
+
+TEST_P(GradedTick, MakesNoHeapCallBesideTheBuilder) {
+  exercise_beside({.rings = 1, .finest = finest_, .memory = 1 << 20});
 }
 
 void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
