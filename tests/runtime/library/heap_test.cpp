@@ -230,6 +230,7 @@ class OverlayTick : public Tick {
   void exercise_beside(const PatchSourceOptions& options);
 
   static constexpr double finest_ = 0.1;  // of rounded ones
+  static constexpr int most_rounds = 2000;
 
   bool rounded_;
   Body overlaid_{
@@ -298,16 +299,19 @@ TEST_P(GradedTick, MakesNoHeapCall) {
 }
 
 TEST_P(GradedTick, MakesNoHeapCallBesideTheBuilder) {
-  exercise_beside({.rings = 1, .finest = finest_, .memory = 1 << 20});
+  exercise_beside({.rings = 1, .finest = finest_, .memory = 1 << 22});
 }
 
 void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
   PatchSource source(overlaid_, with_, options);
+  const auto is_done = [&] {  // once the builder, which a busy machine holds up, has made some
+    return source.built() > 1 && (source.tangents() == nullptr || source.tangents()->telling().made > 1);
+  };
   const auto exercise = [&] {
-    for (int round = 0; round < 20; ++round) {
+    for (int round = 0; round < 20 || (round < most_rounds && !is_done()); ++round) {
       for (std::size_t k = 0; k < poses_.size(); ++k) {
         ToolPose pose = poses_[k];
-        pose.position.x() += 0.04 * round;
+        pose.position.x() += 0.04 * (round % 20);
         source.serve(with_);
         step(overlaid_, with_, pose);
       }
@@ -322,8 +326,7 @@ void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
 #else
   exercise();
 #endif
-  EXPECT_GT(source.built(), 1);
-  EXPECT_TRUE(source.tangents() == nullptr || source.tangents()->telling().made > 1);
+  EXPECT_TRUE(is_done());
 }
 
 TEST_P(OverlayTick, MakesNoSystemCall) {
