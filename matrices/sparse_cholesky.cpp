@@ -4,12 +4,12 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <numeric>
+#include <type_traits>
 
 namespace palpate {
 namespace {
 
 using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-using ConstBlock = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
 std::size_t at(int i) noexcept {
   return static_cast<std::size_t>(i);
@@ -122,7 +122,7 @@ std::vector<int> SparseCholesky::column_counts(const std::vector<std::vector<int
 /// Merges columns with the same rows, and then supernodes with their parents while zeros stay few.
 void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::vector<int>& counts) {
   supernodes_.clear();
-  const int n = static_cast<int>(parent.size());
+  const int n = static_cast<int>(parent.size()) - kept_;
   for (int column = 0; column < n; ++column) {
     const bool joins =
         column > 0 && parent[at(column - 1)] == column && counts[at(column - 1)] == counts[at(column)] + 1;
@@ -149,6 +149,7 @@ void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::
     zeros.push_back(0.0);
   }
   supernodes_.assign(merged.rbegin(), merged.rend());
+  if (kept_ > 0) supernodes_.push_back({.first = n, .columns = kept_, .rows = kept_});
 }
 
 /// [n] Supernode of each column.
@@ -238,12 +239,17 @@ void SparseCholesky::find_room() {
   stack_.resize(most);
 }
 
-void SparseCholesky::analyse(const Eigen::SparseMatrix<double>& A) {
+void SparseCholesky::analyse(const Eigen::SparseMatrix<double>& A, int kept) {
+  kept_ = kept;
+  const int n = static_cast<int>(A.rows()), first_kept = n - kept;
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
-  if (A.rows() > 0) Eigen::AMDOrdering<int>()(A.selfadjointView<Eigen::Lower>(), order);
-  position_.resize(static_cast<std::size_t>(A.rows()));
-  for (int k = 0; k < A.rows(); ++k) position_[at(order.indices()[k])] = k;
+  const Eigen::SparseMatrix<double> A_ee = A.topLeftCorner(first_kept, first_kept);
+  if (first_kept > 0) Eigen::AMDOrdering<int>()(A_ee.selfadjointView<Eigen::Lower>(), order);
+  position_.resize(at(n));
+  std::iota(position_.begin(), position_.end(), 0);
+  for (int k = 0; k < first_kept; ++k) position_[at(order.indices()[k])] = k;
   std::vector<std::vector<int>> before = columns_before(A, position_);
+  for (int row = first_kept + 1; row < n; ++row) before[at(row)].push_back(row - 1);  // they stay together
   const std::vector<int> parent = postordered_tree(before);
   find_supernodes(parent, column_counts(before, parent));
   find_rows(before);
@@ -283,6 +289,16 @@ bool SparseCholesky::eliminate(const Supernode& supernode, double* update) {
   return true;
 }
 
+SparseCholesky::ConstBlock SparseCholesky::diagonal_of(const Supernode& supernode) const {
+  return {values_.data() + supernode.values_at, supernode.columns, supernode.columns,
+          Eigen::OuterStride<>(supernode.rows)};
+}
+
+SparseCholesky::ConstBlock SparseCholesky::lower_of(const Supernode& supernode) const {
+  return {values_.data() + supernode.values_at + supernode.columns, supernode.below(), supernode.columns,
+          Eigen::OuterStride<>(supernode.rows)};
+}
+
 bool SparseCholesky::factorise(const Eigen::SparseMatrix<double>& A) {
   std::fill(values_.begin(), values_.end(), 0.0);
   for (std::size_t k = 0; k < places_.size(); ++k) {
@@ -300,7 +316,7 @@ bool SparseCholesky::factorise(const Eigen::SparseMatrix<double>& A) {
       take(child, top, supernode, update);
       waiting.pop_back();
     }
-    if (!eliminate(supernode, update)) return false;
+    if (at(s) < eliminated() && !eliminate(supernode, update)) return false;
     if (supernode.parent < 0) continue;
     std::copy_n(update, square(supernode.below()), top);
     top += square(supernode.below());
@@ -309,37 +325,48 @@ bool SparseCholesky::factorise(const Eigen::SparseMatrix<double>& A) {
   return true;
 }
 
+/// Solves L_ee^T x = y - L_ke^T x_k in place, where y already has x_k.
+void SparseCholesky::substitute_back(auto& y) const {
+  std::decay_t<decltype(y)> part;
+  for (std::size_t s = eliminated(); s-- > 0;) {
+    const Supernode& supernode = supernodes_[s];
+    const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
+    part.resize(supernode.below(), y.cols());
+    for (int i = 0; i < supernode.below(); ++i) part.row(i) = y.row(rows[i]);
+    auto own = y.middleRows(supernode.first, supernode.columns);
+    own.noalias() -= lower_of(supernode).transpose() * part;
+    diagonal_of(supernode).transpose().template triangularView<Eigen::Upper>().solveInPlace(own);
+  }
+}
+
 template <class Columns>
 Columns SparseCholesky::solve_columns(const Columns& b) const {
   Columns x(b.rows(), b.cols()), y(b.rows(), b.cols()), part;
   for (int k = 0; k < b.rows(); ++k) y.row(position_[at(k)]) = b.row(k);
-  const auto diagonal = [&](const Supernode& supernode) {
-    return ConstBlock(values_.data() + supernode.values_at, supernode.columns, supernode.columns,
-                      Eigen::OuterStride<>(supernode.rows));
-  };
-  const auto lower = [&](const Supernode& supernode) {
-    return ConstBlock(values_.data() + supernode.values_at + supernode.columns, supernode.below(),
-                      supernode.columns, Eigen::OuterStride<>(supernode.rows));
-  };
   for (const Supernode& supernode : supernodes_) {
     const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
     auto own = y.middleRows(supernode.first, supernode.columns);
     if ((own.array() == 0.0).all()) continue;  // few columns of b reach all of L
-    diagonal(supernode).template triangularView<Eigen::Lower>().solveInPlace(own);
-    part.noalias() = lower(supernode) * own;
+    diagonal_of(supernode).template triangularView<Eigen::Lower>().solveInPlace(own);
+    part.noalias() = lower_of(supernode) * own;
     for (int i = 0; i < supernode.below(); ++i) y.row(rows[i]) -= part.row(i);
   }
-  for (std::size_t s = supernodes_.size(); s-- > 0;) {
-    const Supernode& supernode = supernodes_[s];
-    const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
-    part.resize(supernode.below(), b.cols());
-    for (int i = 0; i < supernode.below(); ++i) part.row(i) = y.row(rows[i]);
-    auto own = y.middleRows(supernode.first, supernode.columns);
-    own.noalias() -= lower(supernode).transpose() * part;
-    diagonal(supernode).transpose().template triangularView<Eigen::Upper>().solveInPlace(own);
-  }
+  substitute_back(y);
   for (int k = 0; k < b.rows(); ++k) x.row(k) = y.row(position_[at(k)]);
   return x;
+}
+
+Eigen::Map<const Eigen::MatrixXd> SparseCholesky::schur() const {
+  return {values_.data() + (kept_ > 0 ? supernodes_.back().values_at : 0), kept_, kept_};
+}
+
+Eigen::VectorXd SparseCholesky::extended(const Eigen::VectorXd& x) const {
+  const Eigen::Index n = std::ssize(position_) - kept_;
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(n + kept_), result(n);
+  y.tail(kept_) = x;
+  substitute_back(y);
+  for (Eigen::Index k = 0; k < n; ++k) result[k] = y[position_[static_cast<std::size_t>(k)]];
+  return result;
 }
 
 Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& b) const {

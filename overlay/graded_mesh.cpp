@@ -172,7 +172,6 @@ class GradedBuilder {
         d_(static_cast<std::size_t>(model.dimension())) {
     std::sort(elements.begin(), elements.end());
     patch_.elements = std::move(elements);
-    patch_.is_nested = false;
     patch_.local.element = d_ == 2 ? ElementType::tri6 : ElementType::tet10;
     for (const Index node : nodes_of(mesh_, patch_.elements)) {
       if (held_axes(node) == all_axes()) continue;

@@ -48,9 +48,8 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at, 
 struct PatchMesh {
   std::vector<Index> elements;  ///< elements of the body, ascending
   std::vector<Index>
-      nodes;              ///< [g] mesh nodes of those elements that are not held along every axis, ascending
-  Mesh local;             ///< the fine mesh
-  bool is_nested = true;  ///< false: it fills another space than the elements, or with other shape functions
+      nodes;   ///< [g] mesh nodes of those elements that are not held along every axis, ascending
+  Mesh local;  ///< the fine mesh
   std::vector<Index> body_node;         ///< [local nodes] coincident node of the body, -1 if there is none
   std::vector<Vec3> rest_displacement;  ///< [local nodes] u0 there, by the body's shape functions [m]
   std::vector<Index> parent;            ///< [local elements] element of the body that contains it

@@ -1,7 +1,8 @@
-// Preloaded into a program (LD_PRELOAD), starts it many times after its libraries were loaded once: loading takes longer than a run on a
-// small file. FORK_SERVER names two file descriptors, "in,out". A request is "bytes\n", then that many bytes: the folder to run in, the
-// file there for what is said, the limit of memory [byte] (0: none) and the arguments, each ended by a zero byte. The answer is "pid\n"
-// and, at the end, "status seconds-of-the-processor largest-resident-KiB\n".
+// Preloaded into a program (LD_PRELOAD), starts it many times after its libraries were loaded once: loading
+// takes longer than a run on a small file. FORK_SERVER names two file descriptors, "in,out". A request is
+// "bytes\n", then that many bytes: the folder to run in, the file there for what is said, the limit of memory
+// [byte] (0: none) and the arguments, each ended by a zero byte. The answer is "pid\n" and, at the end,
+// "status seconds-of-the-processor largest-resident-KiB\n".
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -65,7 +66,8 @@ static int serve(int count, char** arguments, char** environment) {
 }
 
 // Where the C library enters the program.
-int __libc_start_main(Main* main, int count, char** arguments, void (*init)(void), void (*fini)(void), void (*of_loader)(void), void* stack) {
+int __libc_start_main(Main* main, int count, char** arguments, void (*init)(void), void (*fini)(void),
+                      void (*of_loader)(void), void* stack) {
   program = main;
   if (sscanf(getenv("FORK_SERVER"), "%d,%d", &in, &out) != 2) _exit(126);
   unsetenv("LD_PRELOAD");

@@ -60,7 +60,8 @@ double skew(const Eigen::Matrix3d& columns) {
   double most = 0.0;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3d one = columns.col(a).normalized(), next = columns.col((a + 1) % 3).normalized();
-    most = std::max(most, std::abs(90.0 - degrees(one.dot(next))));
+    const double angle = std::abs(90.0 - degrees(one.dot(next)));
+    if (!(angle <= most)) most = angle;  // a number or not
   }
   return most;
 }
@@ -71,7 +72,7 @@ ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Label
   constexpr double least_skew = 0.1;  // degrees
   const Eigen::Matrix3d given = place.to_space.leftCols<3>();
   Eigen::Matrix3d directions = given;
-  const bool is_sheared = skew(given) > least_skew && std::abs(given.determinant()) > 0.0;
+  const bool is_sheared = !(skew(given) <= least_skew);
   if (is_sheared) place.to_space.leftCols<3>() = directions = straightened(given);
   const Axes axes = axes_of(place.to_space);
   const double unit = place.unit > 0.0 ? place.unit : 1.0;

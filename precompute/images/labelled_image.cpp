@@ -23,6 +23,7 @@
 namespace palpate {
 namespace {
 
+constexpr double largest_shear = 80.0;           // degrees; gantries tilt by 30
 constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels of 0.1 mm have 50
 constexpr double voxels_per_edge = 20.0;
 constexpr double least_turn = 0.1;  // of the image's axes that is reported [degrees]
@@ -47,10 +48,11 @@ const ImageKind& kind_of(const std::filesystem::path& file) {
   return found == kinds.end() ? inr : *found;
 }
 
-/// Throws Error for voxel sides and an origin that no image has.
-void check_geometry(const VoxelGrid& grid, const std::string& where) {
+/// Throws Error for voxel sides, an origin and a shear that no image has.
+void check_geometry(const VoxelGrid& grid, double sheared, const std::string& where) {
   const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
-  if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
+  if (!((grid.spacing.array() > 1e-30).all() && largest < 1e30 &&
+        largest <= largest_spacing_ratio * smallest)) {
     throw Error(fmt::format("the voxels' sides (VX, VY, VZ; pixdim; space directions) are {}, {}, {}",
                             shown(grid.spacing[0]), shown(grid.spacing[1]), shown(grid.spacing[2])),
                 where,
@@ -61,6 +63,14 @@ void check_geometry(const VoxelGrid& grid, const std::string& where) {
     throw Error(fmt::format("the image's origin (TX, TY, TZ; sform, qform; space origin) is ({}, {}, {})",
                             shown(grid.origin[0]), shown(grid.origin[1]), shown(grid.origin[2])),
                 where, "correct the header");
+  }
+  if (!(sheared <= largest_shear)) {
+    throw Error(
+        fmt::format("two axes of the image (sform, qform; space directions) are {} degrees from a "
+                    "right angle",
+                    shown(sheared)),
+        where,
+        fmt::format("correct the header: a tilted gantry shears by less than {} degrees", largest_shear));
   }
 }
 
@@ -112,7 +122,7 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
   if (labels.size() != body.voxels()) {
     fail_on_answer();
   }
-  check_geometry(body, where);
+  check_geometry(body, header.sheared, where);
   if (header.turned > least_turn)
     notes.push_back(fmt::format(
         "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));

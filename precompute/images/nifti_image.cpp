@@ -43,7 +43,8 @@ struct Dimensions {
   double offset = 0.0;                // of the first voxel in the file [byte]
   double shift = 0.0;                 // from values to labels
   std::array<double, 3> sides{};      // of a voxel, if there is no matrix
-  bool has_matrix = false;
+  bool has_matrix = false, has_quaternion = false;
+  std::array<double, 18> place{};  // quatern_b, c, d and qoffset, then the matrix by rows
 };
 
 std::optional<Dimensions> read_dimensions(std::span<const char> header) {
@@ -59,7 +60,10 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
       result.shift = static_cast<double>(number_at<float>(header, 116, swapped));
       for (std::size_t i = 0; i < 3; ++i)
         result.sides.at(i) = static_cast<double>(number_at<float>(header, 80 + 4 * i, swapped));
+      result.has_quaternion = number_at<std::int16_t>(header, 252, swapped) > 0;
       result.has_matrix = number_at<std::int16_t>(header, 254, swapped) > 0;
+      for (std::size_t i = 0; i < 18; ++i)
+        result.place.at(i) = static_cast<double>(number_at<float>(header, 256 + 4 * i, swapped));
       return result;
     }
     if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2") {
@@ -70,7 +74,10 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
       result.shift = number_at<double>(header, 184, swapped);
       for (std::size_t i = 0; i < 3; ++i)
         result.sides.at(i) = number_at<double>(header, 112 + 8 * i, swapped);
+      result.has_quaternion = number_at<std::int32_t>(header, 344, swapped) > 0;
       result.has_matrix = number_at<std::int32_t>(header, 348, swapped) > 0;
+      for (std::size_t i = 0; i < 18; ++i)
+        result.place.at(i) = number_at<double>(header, 352 + 8 * i, swapped);
       return result;
     }
   }
@@ -168,6 +175,17 @@ void check_sides(const Dimensions& said, const std::string& where) {
   }
 }
 
+/// Throws Error for a matrix or quaternion that is not finite: libnifti would take 0 for such numbers.
+void check_place(const Dimensions& said, const std::string& where) {
+  const std::span<const double> all(said.place);
+  const auto used = said.has_matrix ? all.subspan(6) : all.first(said.has_quaternion ? 6 : 0);
+  const auto wrong = std::ranges::find_if(used, [](double number) { return !std::isfinite(number); });
+  if (wrong != used.end())
+    throw Error(fmt::format("the image's {} has a number that is {}",
+                            said.has_matrix ? "sform (srow_x, srow_y, srow_z)" : "qform", *wrong),
+                where, "correct the header");
+}
+
 }  // namespace
 
 bool is_nifti(const std::filesystem::path& file) {
@@ -182,7 +200,9 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
   const std::string header = header_of(stream.get());
   const std::optional<Dimensions> said = read_dimensions(header);
   if (!said) return {};
-  const auto& [dim, bits, offset, shift, sides, has_matrix] = *said;
+  const std::array<std::int64_t, 8>& dim = said->dim;
+  const std::int64_t bits = said->bits;
+  const double offset = said->offset;
   double voxels = 1.0;
   std::string product;
   for (std::size_t i = 1; i <= static_cast<std::size_t>(std::clamp<std::int64_t>(dim[0], 0, 7)); ++i) {
@@ -193,6 +213,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
     product += fmt::format("{}{}", product.empty() ? "" : " x ", dim.at(i));
   }
   check_sides(*said, where);
+  check_place(*said, where);
   if (!(bits >= 0 && bits <= 256 && offset >= 0.0 && offset < 1e9))
     throw Error(fmt::format("bitpix and vox_offset of the image's header are {} and {}", bits, offset), where,
                 "correct the header");
@@ -210,7 +231,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
                     product, bits, bytes, present),
         where, "get the whole file, or correct the header");
   }
-  if (behind.blank && shift == 0.0) fail_on_blank(where);
+  if (behind.blank && said->shift == 0.0) fail_on_blank(where);
   return std::max(file_size(file), bytes);
 }
 

@@ -46,7 +46,7 @@ HyperelasticPatch::HyperelasticPatch(const Body& body, PatchMesh mesh)
     : body_(body),
       mesh_(std::move(mesh)),
       live_(input_of(body.model(), mesh_), {.law = LiveLaw::neo_hookean}),
-      condensation_(body.model(), mesh_),
+      condensation_(body.model(), mesh_, memory_),
       stored_(stored_nodes_of(body, mesh_)),
       local_of_surface_(body.surface_rest_positions().size(), -1),
       stiffness_(stiffness_at(body, stored_)),
@@ -129,8 +129,13 @@ bool HyperelasticPatch::set_tangent(const VectorXd& forces) {
     if (kind == TangentKind::positive) {  // the positive part may be singular
       for (const Index place : live_.pattern().diagonal()) K_.valuePtr()[place] *= 1.0 + 1e-8;
     }
-    if (!condensation_.set(K_, f)) continue;
-    around_.compute(stiffness_ - linear_ + condensation_.body_stiffness() - condensation_.softening());
+    condensation_.clear();
+    for (Eigen::Index column = 0; column < K_.outerSize(); ++column) {
+      for (LiveMatrix::InnerIterator entry(K_, column); entry; ++entry)
+        condensation_.add(entry.row(), column, entry.value());
+    }
+    if (!condensation_.factorise(f)) continue;
+    around_.compute(stiffness_ - linear_ + condensation_.stiffness());
     if (around_.info() == Eigen::Success) return true;
   }
   return false;
@@ -194,12 +199,10 @@ std::shared_ptr<const Patch> HyperelasticPatch::linearise() {
   internal_forces(live_, at_rest_ + u, {}, f);
   const VectorXd internal = rest_forces_ - f;
   if (!set_tangent(internal)) return nullptr;
-  VectorXd by_internal;
-  CondensedPatch condensed = condensation_.condensed(by_internal);
-  condensed.G += linear_ - condensation_.body_stiffness();
+  const CondensedPatch condensed = condensation_.condensed(linear_);
   PatchOffset offset{.forces = linear_ * place_.u_Q - condensation_.shape().transpose() * internal -
                                condensed.G * place_.u_Q + condensation_.forces_on_body(),
-                     .surface = -condensed.T * place_.u_Q - by_internal};
+                     .surface = -condensed.T * place_.u_Q - condensation_.by_forces()};
   const Eigen::Index d = body_.dimension();
   for (Eigen::Index dof = 0; dof < offset.surface.size(); ++dof)
     offset.surface[dof] += u[d * condensed.surface[static_cast<std::size_t>(dof / d)] + dof % d];

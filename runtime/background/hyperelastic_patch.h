@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "overlay/tangent_condensation.h"
+#include "overlay/condensation.h"
 #include "runtime/body/make_patch.h"
 #include "statics/live_body.h"
 
@@ -80,7 +80,8 @@ class HyperelasticPatch {
   const Body& body_;
   PatchMesh mesh_;
   LiveBody live_;
-  TangentCondensation condensation_;
+  CondensationMemory memory_;
+  Condensation condensation_;
   std::vector<Index> stored_;            // [g] Q
   std::vector<Index> local_of_surface_;  // [S] local node, -1 outside the patch
   Eigen::MatrixXd stiffness_;            // [d g x d g] Xi_QQ^-1: the linear body condensed onto Q

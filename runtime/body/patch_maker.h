@@ -52,7 +52,7 @@ class PatchMaker {
   Subdivisions cuts_;
   int rings_;
   double finest_;
-  LayeredStiffness work_;
+  CondensationMemory work_;
 };
 
 /// The number by which a recording names the centre of a patch: a mesh node, of a rounded body a surface

@@ -117,6 +117,30 @@ TEST(SparseCholesky, SolvesAsADenseFactorDoes) {
   }
 }
 
+TEST(SparseCholesky, KeptUnknownsGetTheSchurComplement) {
+  for (const Graph& graph : graphs()) {
+    SCOPED_TRACE(graph.name);
+    for (const int kept : {1, (graph.dofs * graph.nodes + 2) / 3, graph.dofs * graph.nodes}) {
+      SparseCholesky factor;
+      factor.analyse(matrix_of(graph, 1), kept);
+      for (const unsigned seed : {1U, 2U}) {
+        Sparse A = matrix_of(graph, seed);
+        A.coeffRef(A.rows() - 1, A.rows() - 1) = -1.0;  // kept ones need not be definite
+        ASSERT_TRUE(factor.factorise(A));
+        const Eigen::MatrixXd all = dense(A);
+        const Eigen::Index n = A.rows() - kept;
+        const Eigen::MatrixXd coupling = all.bottomLeftCorner(kept, n),
+                              back = all.topLeftCorner(n, n).llt().solve(coupling.transpose()),
+                              expected = all.bottomRightCorner(kept, kept) - coupling * back,
+                              schur = Eigen::MatrixXd(factor.schur()).selfadjointView<Eigen::Lower>();
+        EXPECT_LT((schur - expected).norm(), 1e-11 * expected.norm());
+        const Eigen::VectorXd x = Eigen::VectorXd::Random(kept);
+        EXPECT_LT((factor.extended(x) + back * x).norm(), 1e-11 * (1.0 + (back * x).norm()));
+      }
+    }
+  }
+}
+
 TEST(SparseCholesky, ReadsTheLowerTriangleAlone) {
   const Sparse lower = matrix_of({"plane", 30, grid(6, 5, 1), 2}, 3);
   Eigen::MatrixXd both = dense(lower);

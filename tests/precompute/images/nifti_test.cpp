@@ -284,6 +284,28 @@ TEST_F(NiftiImage, SidesThatAreNotPositiveAreRefused) {
   }
 }
 
+TEST_F(NiftiImage, AxesThatAreNoneAreRefused) {
+  for (const int version : {1, 2}) {
+    Layout layout;
+    layout.version = version;
+    layout.shear = 40.0 * spacing[2];
+    expect_mentions(error(nifti(layout)), {"a.nii", "from a right angle", "correct the header"});
+    layout.shear = 0.0;
+    for (const double no_number :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      for (std::size_t entry = 0; entry < 12; ++entry) {
+        std::string bytes = nifti(layout);
+        const auto put = [&](std::size_t offset, auto value) {
+          const auto raw = std::bit_cast<std::array<char, sizeof(value)>>(value);
+          std::ranges::copy(raw, bytes.begin() + static_cast<std::ptrdiff_t>(offset));
+        };
+        version == 1 ? put(280 + 4 * entry, static_cast<float>(no_number)) : put(400 + 8 * entry, no_number);
+        expect_mentions(error(bytes), {"a.nii", "correct the header"});
+      }
+    }
+  }
+}
+
 /// A scan in the place of a segmentation.
 TEST_F(NiftiImage, GreyImageIsNoneOfLabelsUntilARangeIsSaid) {
   Layout layout;
