@@ -80,6 +80,17 @@ class Surfaces(ProgramTest):
         self.assertRegex(planned.stderr, r"note: Green's functions of \d+\.\d GB")
         self.assertIn("leave out precision and compression in [storage], or use a coarser mesh, or scope = \"surface\" in [storage]", planned.stderr)
 
+    def test_elements_that_lock_are_told(self):
+        def plan(element, nu):
+            self.write("model.toml", 'name = "a"\n[geometry]\nbox = {size = [1, 1, 1], cells = [2, 2, 2]}\n'
+                                     f'[mesh]\nelement = "{element}"\n{BODY.replace("ratio = 0.4", f"ratio = {nu}")}')
+            planned = run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
+            self.assertEqual(planned.returncode, 0, planned.stderr)
+            return planned.stderr
+        self.assertIn("note: tet4 at Poisson's ratio 0.45 is too stiff to a touch, by 13 to 24 %", plan("tet4", 0.45))
+        for element, nu in (("tet4", 0.4), ("tet10", 0.45), ("hex8", 0.45)):
+            self.assertNotIn("too stiff", plan(element, nu))
+
     def test_many_nodes_are_compressed(self):
         self.write("model.toml", 'name = "a"\n[geometry]\nbox = {size = [1, 1, 1], cells = [36, 36, 36]}\n' + BODY + '[storage]\nscope = "surface"\n')
         planned = run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
