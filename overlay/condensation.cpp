@@ -114,7 +114,8 @@ bool Condensation::factorise(const VectorXd& f) {
 
   const auto S = memory_.factor.schur();
   factor_ = S.topLeftCorner(on_surface_, on_surface_);
-  if (Eigen::LLT<Eigen::Ref<MatrixXd>>(factor_).info() != Eigen::Success) return false;
+  const Eigen::LLT<Eigen::Ref<MatrixXd>> in_place(factor_);
+  if (in_place.info() != Eigen::Success || !(factor_.diagonal().array() > 0.0).all()) return false;
   columns_ = S.bottomLeftCorner(body + 1, on_surface_).transpose();
   factor_.triangularView<Eigen::Lower>().solveInPlace(columns_);
   const auto of_body = columns_.leftCols(body);
@@ -159,6 +160,7 @@ CondensedPatch Condensation::condensed(const MatrixXd& K_P) const {
                         .G = K_P - stiffness_,
                         .T = MatrixXd::Zero(dofs, body),
                         .compliance = MatrixXd::Zero(dofs, dofs)};
+  result.G.triangularView<Eigen::StrictlyUpper>() = result.G.transpose();  // to the last bit: files keep half
   MatrixXd inverse = MatrixXd::Identity(on_surface_, on_surface_);
   factor_.triangularView<Eigen::Lower>().solveInPlace(inverse);
   const MatrixXd by_body = inverse.transpose() * columns_.leftCols(body);

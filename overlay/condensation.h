@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// Memory to condense in, for one patch after the other.
+/// Memory to condense in, for one Condensation after the other.
 struct CondensationMemory {
   SparseCholesky factor;
   std::vector<Eigen::Triplet<double>> entries;
