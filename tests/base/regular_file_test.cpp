@@ -10,7 +10,7 @@
 
 #include <cstring>
 
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::regular_file_test {
 namespace {

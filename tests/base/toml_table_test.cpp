@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/toml_text.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::toml_table_test {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "base/toml_text.h"
 #include "base/words.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::toml_test {
 namespace {

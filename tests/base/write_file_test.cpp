@@ -8,7 +8,7 @@
 #include <csignal>
 
 #include "base/regular_file.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::write_file_test {
 namespace {

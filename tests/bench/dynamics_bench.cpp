@@ -47,7 +47,7 @@
 #include "runtime/body/packed_newmark.h"
 #include "runtime/core/body/modal_newmark.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/make_dynamics.h"
+#include "tests/support/bodies/make_dynamics.h"
 
 namespace palpate {
 namespace {

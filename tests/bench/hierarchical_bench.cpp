@@ -37,9 +37,9 @@
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "runtime/core/body/greens.h"
+#include "tests/support/bodies/precompute_case.h"
 #include "tests/support/compression/clustered_body.h"
 #include "tests/support/folders.h"
-#include "tests/support/precompute_case.h"
 
 namespace palpate {
 namespace {

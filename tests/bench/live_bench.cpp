@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "runtime/live/live_stepper.h"
-#include "tests/support/live_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
 
 namespace palpate::test {
 namespace {

@@ -43,7 +43,7 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/core/tick/step.h"
 #include "tests/support/folders.h"
-#include "tests/support/partitioned_inverse.h"
+#include "tests/support/second_routes/partitioned_inverse.h"
 
 namespace palpate {
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "base/error.h"
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 namespace palpate::test::checksum_test {
 namespace {

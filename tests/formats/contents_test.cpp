@@ -27,8 +27,8 @@
 #include "formats/writer/hdf5_file.h"
 #include "formats/writer/hdf5_walk.h"
 #include "matrices/hierarchical_product.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test::contents_test {
 namespace {

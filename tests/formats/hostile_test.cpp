@@ -6,8 +6,8 @@
 #include <random>
 
 #include "formats/model_file.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test::hostile_test {
 namespace {

@@ -16,8 +16,8 @@
 #include "formats/journal.h"
 #include "formats/writer/hdf5_file.h"
 #include "formats/writer/model_writer.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test::model_file_test {
 namespace {

@@ -7,8 +7,8 @@
 #include "formats/contents.h"
 #include "formats/model_file.h"
 #include "formats/writer/model_writer.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test::precision_test {
 namespace {

@@ -20,7 +20,7 @@
 #include "formats/mcap/writer.h"
 #include "formats/recording_messages.h"
 #include "formats/writer/hdf5_file.h"
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 namespace palpate::test::recording_test {
 namespace {

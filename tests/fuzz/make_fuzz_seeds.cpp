@@ -4,7 +4,7 @@
 
 #include "formats/recording.h"
 #include "tests/fuzz/fuzz_input.h"
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 namespace {
 

@@ -14,8 +14,8 @@
 #include "formats/writer/hdf5.h"
 #include "matrices/hierarchical_product.h"
 #include "tests/fuzz/fuzz_input.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test {
 namespace {

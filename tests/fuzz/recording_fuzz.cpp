@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "formats/recording.h"
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 namespace palpate::test {
 namespace {

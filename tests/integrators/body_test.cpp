@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "tests/support/dynamics_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
 
 namespace palpate::body_test {
 namespace {

@@ -10,8 +10,8 @@
 #include <numbers>
 
 #include "tests/integrators/timoshenko_beam.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/dynamics_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::cantilever_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tests/integrators/stability_limit.h"
-#include "tests/support/dynamics_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
 
 namespace palpate::oscillator_test {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/support/dynamics_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
 
 namespace palpate::test {
 

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "tests/integrators/stability_limit.h"
-#include "tests/support/dynamics_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
 
 namespace palpate::stability_test {
 namespace {

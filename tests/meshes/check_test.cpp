@@ -12,9 +12,9 @@
 #include "meshes/element.h"
 #include "meshes/surface.h"
 #include "meshes/topology.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::check_test {
 namespace {

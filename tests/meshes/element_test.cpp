@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/meshes_elements.h"
+#include "tests/support/bodies/meshes_elements.h"
 
 namespace palpate::element_test {
 namespace {

@@ -1,8 +1,8 @@
 // Element mass against integrals of high order and the mechanics of rigid bodies.
 #include <gtest/gtest.h>
 
-#include "tests/support/dense_algebra.h"
-#include "tests/support/meshes_elements.h"
+#include "tests/support/bodies/meshes_elements.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::mass_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <numeric>
 
-#include "tests/support/meshes_elements.h"
+#include "tests/support/bodies/meshes_elements.h"
 
 namespace palpate::quadrature_test {
 namespace {

@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "meshes/element.h"
-#include "tests/support/meshes_bodies.h"
+#include "tests/support/bodies/meshes_bodies.h"
 
 namespace palpate::quality_test {
 namespace {

@@ -4,8 +4,8 @@
 #include "meshes/edge_middles.h"
 #include "meshes/element.h"
 #include "meshes/selection.h"
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::select_test {
 namespace {

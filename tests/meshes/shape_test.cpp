@@ -12,8 +12,8 @@
 #include "meshes/element.h"
 #include "meshes/quality.h"
 #include "meshes/surface.h"
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::shape_test {
 namespace {

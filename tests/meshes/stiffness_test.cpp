@@ -1,8 +1,8 @@
 // Element stiffness against closed forms, integrals of high order and what elasticity says of it.
 #include <gtest/gtest.h>
 
-#include "tests/support/dense_algebra.h"
-#include "tests/support/meshes_elements.h"
+#include "tests/support/bodies/meshes_elements.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::stiffness_test {
 namespace {

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <map>
 
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::surface_test {
 namespace {

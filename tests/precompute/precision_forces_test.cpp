@@ -17,7 +17,7 @@
 #include "precompute/inspect.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/verify.h"
-#include "tests/support/baked_body.h"
+#include "tests/support/bodies/baked_body.h"
 #include "tests/support/folders.h"
 
 namespace palpate::precision_forces_test {

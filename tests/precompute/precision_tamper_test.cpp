@@ -5,8 +5,8 @@
 #include <map>
 
 #include "precompute/verify.h"
-#include "tests/support/baked_body.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/bodies/baked_body.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::precision_tamper_test {
 namespace {

@@ -8,8 +8,8 @@
 #include "formats/model.h"
 #include "meshes/element.h"
 #include "runtime/live/plastic_flow.h"
-#include "tests/support/live_bodies.h"
-#include "tests/support/springs.h"
+#include "tests/support/bodies/live_bodies.h"
+#include "tests/support/bodies/springs.h"
 
 namespace palpate::balance_test {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "base/error.h"
 #include "meshes/element.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/live_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::live_forces_test {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "base/error.h"
 #include "statics/surface_change.h"
-#include "tests/support/warp_cases.h"
+#include "tests/support/bodies/warp_cases.h"
 
 namespace palpate::surface_warp_test {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <map>
 
-#include "tests/support/live_cases.h"
+#include "tests/support/bodies/live_cases.h"
 
 namespace palpate::live_truth_test {
 namespace {

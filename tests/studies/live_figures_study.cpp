@@ -18,9 +18,9 @@
 
 #include "runtime/live/live_stepper.h"
 #include "statics/balance.h"
-#include "tests/support/live_bodies.h"
-#include "tests/support/springs.h"
-#include "tests/support/thrown_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
+#include "tests/support/bodies/springs.h"
+#include "tests/support/bodies/thrown_bodies.h"
 
 namespace palpate::test {
 namespace {

@@ -12,7 +12,7 @@
 #include <fstream>
 #include <string>
 
-#include "tests/support/live_cases.h"
+#include "tests/support/bodies/live_cases.h"
 
 namespace palpate::test {
 namespace {

@@ -17,7 +17,7 @@
 
 #include "base/error.h"
 #include "meshes/generate.h"
-#include "tests/support/mixed_body.h"
+#include "tests/support/bodies/mixed_body.h"
 #include "tests/support/study.h"
 
 namespace palpate {

@@ -15,8 +15,8 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "meshes/generate.h"
-#include "tests/support/rest_cases.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/rest_cases.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate {
 namespace {

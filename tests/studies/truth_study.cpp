@@ -7,10 +7,10 @@
 // A tool is s15, a sphere of 15 mm, or c20x80, a capsule of radius 20 mm and 80 mm between its ends' middles,
 // across --along and --slide. It comes along --along through --at, presses in by --depth [m] (0.8 radii at
 // most) at half of --speed and slides by --slide, then by half of it back and by --deeper deeper (0.2 radii
-// at most), and back the whole way. The truth (tests/support/surface_truth.h) goes the same way beside the
-// runtime, with its own forces. Without friction it can be had in every --every-th tick alone; where a tool
-// is deep enough for more than one equilibrium that may find another. Times are those of the tick's own
-// thread (its processor time); the dense solver is timed in every
+// at most), and back the whole way. The truth (tests/support/second_routes/surface_truth.h) goes the same way
+// beside the runtime, with its own forces. Without friction it can be had in every --every-th tick alone;
+// where a tool is deep enough for more than one equilibrium that may find another. Times are those of the
+// tick's own thread (its processor time); the dense solver is timed in every
 // --dense-th tick. A line of a table for each tool, friction and room. scripts/studies/truth runs it.
 #include <fmt/format.h>
 
@@ -27,8 +27,8 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "runtime/core/tick/step.h"
+#include "tests/support/second_routes/surface_truth.h"
 #include "tests/support/study.h"
-#include "tests/support/surface_truth.h"
 
 namespace palpate {
 namespace {

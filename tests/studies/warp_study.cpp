@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "tests/support/warp_cases.h"
+#include "tests/support/bodies/warp_cases.h"
 
 namespace palpate::test {
 namespace {

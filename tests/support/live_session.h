@@ -6,7 +6,7 @@
 #include "meshes/generate.h"
 #include "runtime/body/body.h"
 #include "runtime/live/live_model.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::test {
 

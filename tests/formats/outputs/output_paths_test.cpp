@@ -11,8 +11,8 @@
 
 #include "formats/model_file.h"
 #include "formats/recording.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/formats_tamper.h"
 
 namespace palpate::test::output_paths_test {
 namespace {

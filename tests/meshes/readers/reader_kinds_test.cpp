@@ -5,8 +5,8 @@
 #include "meshes/element.h"
 #include "meshes/readers/volume_mesh.h"
 #include "meshes/surface.h"
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::reader_kinds_test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "meshes/readers/volume_mesh.h"
 #include "meshes/readers/vtu_writer.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::reader_test {
 namespace {

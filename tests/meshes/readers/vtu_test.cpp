@@ -12,8 +12,8 @@
 #include "meshes/readers/volume_mesh.h"
 #include "meshes/readers/vtu_writer.h"
 #include "meshes/surface.h"
-#include "tests/support/meshes_bodies.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/bodies/meshes_bodies.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::vtu_test {
 namespace {

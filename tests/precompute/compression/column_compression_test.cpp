@@ -14,7 +14,7 @@
 #include "precompute/compression/recompression.h"
 #include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/compression/inverted_body.h"
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::column_compression_test {
 namespace {

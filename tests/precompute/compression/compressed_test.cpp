@@ -20,9 +20,9 @@
 #include "runtime/body/body.h"
 #include "runtime/body/scaled_model.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/baked_body.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/formats_tamper.h"
+#include "tests/support/bodies/baked_body.h"
+#include "tests/support/files/formats_tamper.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::compressed_test {
 namespace {

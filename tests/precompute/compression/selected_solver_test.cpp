@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "meshes/generate.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::selected_solver_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "precompute/description/read_description.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::description_test {
 namespace {

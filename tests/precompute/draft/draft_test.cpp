@@ -9,7 +9,7 @@
 #include "precompute/description/description.h"
 #include "precompute/description/read_description.h"
 #include "precompute/draft/questions.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::draft_test {
 namespace {

@@ -6,9 +6,9 @@
 #include "meshes/element.h"
 #include "precompute/description/read_description.h"
 #include "precompute/numerics/meshed_body.h"
+#include "tests/support/bodies/geometry_shapes.h"
 #include "tests/support/documentation.h"
 #include "tests/support/folders.h"
-#include "tests/support/geometry_shapes.h"
 
 namespace palpate::body_test {
 namespace {

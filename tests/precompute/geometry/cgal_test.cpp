@@ -8,7 +8,7 @@
 #include "meshes/surface.h"
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/mesh_parts.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::cgal_test {
 namespace {

@@ -10,7 +10,7 @@
 #include "precompute/images/inr_image.h"
 #include "precompute/machine/allotment.h"
 #include "precompute/surfaces/surface_repair.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::hostile_test {
 namespace {

@@ -10,7 +10,7 @@
 #include "precompute/geometry/distance_field.h"
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/interface_crossings.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::image_test {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "precompute/geometry/picture_reader.h"
 #include "precompute/geometry/pixel_body.h"
-#include "tests/support/geometry_plane.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_plane.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::picture_test {
 namespace {

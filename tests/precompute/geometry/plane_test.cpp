@@ -6,8 +6,8 @@
 
 #include "precompute/geometry/plane_mesh.h"
 #include "precompute/geometry/polygon_check.h"
-#include "tests/support/geometry_plane.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_plane.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::plane_test {
 namespace {

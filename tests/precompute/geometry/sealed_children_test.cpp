@@ -20,8 +20,8 @@
 #include "precompute/geometry/plane_mesh.h"
 #include "precompute/geometry/tetgen_mesh.h"
 #include "precompute/surfaces/surface_repair.h"
+#include "tests/support/bodies/geometry_shapes.h"
 #include "tests/support/forbidden_calls.h"
-#include "tests/support/geometry_shapes.h"
 
 namespace palpate::sealed_children_test {
 namespace {

@@ -5,7 +5,7 @@
 #include "meshes/surface.h"
 #include "precompute/geometry/tetgen_mesh.h"
 #include "precompute/surfaces/shells.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::tetgen_test {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "precompute/images/labelled_image.h"
 #include "precompute/images/nifti_image.h"
-#include "tests/support/geometry_shapes.h"
-#include "tests/support/labelled_sample.h"
+#include "tests/support/bodies/geometry_shapes.h"
+#include "tests/support/bodies/labelled_sample.h"
 
 namespace palpate::nifti_test {
 namespace {

@@ -11,8 +11,8 @@
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 #include "precompute/numerics/factor.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::assembly_test {
 namespace {

@@ -13,10 +13,10 @@
 #include "base/error.h"
 #include "meshes/surface.h"
 #include "precompute/numerics/lowest_modes.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/make_dynamics.h"
-#include "tests/support/precompute_case.h"
-#include "tests/support/precompute_kinds.h"
+#include "tests/support/bodies/make_dynamics.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/bodies/precompute_kinds.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::dynamics_test {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "meshes/element.h"
 #include "precompute/numerics/factor.h"
-#include "tests/support/gauss_rules.h"
-#include "tests/support/precompute_case.h"
-#include "tests/support/precompute_kinds.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/bodies/precompute_kinds.h"
+#include "tests/support/second_routes/gauss_rules.h"
 
 namespace palpate::elements_test {
 namespace {

@@ -10,8 +10,8 @@
 #include "meshes/surface.h"
 #include "precompute/numerics/greens_solver.h"
 #include "precompute/numerics/scope.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::greens_test {
 namespace {

@@ -13,7 +13,7 @@
 #include "precompute/description/read_description.h"
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/meshed_body.h"
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::le10_test {
 namespace {

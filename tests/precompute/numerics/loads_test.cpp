@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "meshes/element.h"
-#include "tests/support/meshes_files.h"
-#include "tests/support/precompute_kinds.h"
+#include "tests/support/bodies/precompute_kinds.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::loads_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "precompute/surfaces/surface_repair.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::repair_test {
 namespace {

@@ -9,7 +9,7 @@
 #include "precompute/surfaces/shells.h"
 #include "precompute/surfaces/surface_input.h"
 #include "precompute/surfaces/surface_repair.h"
-#include "tests/support/geometry_shapes.h"
+#include "tests/support/bodies/geometry_shapes.h"
 
 namespace palpate::surface_test {
 namespace {

@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "precompute/warping/loaded_part.h"
 #include "statics/range_of_errors.h"
-#include "tests/support/warp_cases.h"
+#include "tests/support/bodies/warp_cases.h"
 
 namespace palpate::warp_study_test {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "runtime/app/mouse_device.h"
 #include "runtime/loop/loop.h"
-#include "tests/support/recorded_ticks.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/recorded_ticks.h"
 
 namespace palpate::mouse_test {
 namespace {

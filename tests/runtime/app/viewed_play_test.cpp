@@ -31,8 +31,8 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loading.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/folders.h"
-#include "tests/support/runtime_model.h"
 
 namespace palpate::viewed_play_test {
 namespace {

@@ -16,8 +16,8 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/core/body/near_field.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/mixed_body.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/mixed_body.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::hyperelastic_patch_test {
 namespace {

@@ -16,7 +16,7 @@
 #include "meshes/surface.h"
 #include "runtime/background/element_stress.h"
 #include "runtime/body/patch_maker.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::surface_stress_test {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "runtime/background/element_stress.h"
 #include "runtime/background/surface_stress.h"
-#include "tests/support/warp_cases.h"
+#include "tests/support/bodies/warp_cases.h"
 
 namespace palpate::turned_stress_test {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "meshes/topology.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::body_test {
 namespace {

@@ -8,10 +8,10 @@
 #include "base/error.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/body/packed_newmark.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/dynamics_sample.h"
-#include "tests/support/make_dynamics.h"
+#include "tests/support/bodies/dynamics_sample.h"
+#include "tests/support/bodies/make_dynamics.h"
 #include "tests/support/runtime_tool.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::dynamics_contact_test {
 namespace {

@@ -9,7 +9,7 @@
 #include "base/vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/body/patch_maker.h"
-#include "tests/support/dynamics_sample.h"
+#include "tests/support/bodies/dynamics_sample.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::dynamics_free_motion_test {

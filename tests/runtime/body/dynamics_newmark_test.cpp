@@ -8,7 +8,7 @@
 #include "runtime/body/packed_newmark.h"
 #include "runtime/core/body/greens.h"
 #include "runtime/core/body/modal_newmark.h"
-#include "tests/support/dynamics_sample.h"
+#include "tests/support/bodies/dynamics_sample.h"
 
 namespace palpate::dynamics_newmark_test {
 namespace {

@@ -18,7 +18,7 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/core/body/free_motion.h"
 #include "runtime/core/body/near_field.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::graded_patch_test {
 namespace {

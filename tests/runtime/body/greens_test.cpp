@@ -6,8 +6,8 @@
 #include <random>
 
 #include "base/error.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/compression/hierarchical_sample.h"
-#include "tests/support/runtime_model.h"
 
 namespace palpate::greens_test {
 namespace {

@@ -13,7 +13,7 @@
 #include "runtime/body/body.h"
 #include "runtime/core/solve/nearest_point.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::near_field_test {
 namespace {

@@ -17,8 +17,8 @@
 #include "meshes/element.h"
 #include "meshes/surface.h"
 #include "runtime/body/make_patch.h"
-#include "tests/support/partitioned_inverse.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/second_routes/partitioned_inverse.h"
 
 namespace palpate::overlay_test {
 namespace {

@@ -14,7 +14,7 @@
 #include "runtime/body/overlay.h"
 #include "runtime/core/body/free_motion.h"
 #include "runtime/core/body/near_field.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::patch_test {
 namespace {

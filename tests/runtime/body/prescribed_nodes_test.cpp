@@ -13,7 +13,7 @@
 
 #include "base/error.h"
 #include "base/vectors.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::prescribed_nodes_test {
 namespace {

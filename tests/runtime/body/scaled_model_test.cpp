@@ -13,8 +13,8 @@
 #include "overlay/condensation.h"
 #include "runtime/body/body.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::scaled_model_test {
 namespace {

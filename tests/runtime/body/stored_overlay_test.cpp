@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "overlay/condensation.h"
 #include "runtime/background/patch_source.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::stored_overlay_test {
 namespace {

@@ -17,10 +17,10 @@
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_scene.h"
 #include "runtime/loop/loading.h"
+#include "tests/support/files/formats_sample.h"
+#include "tests/support/files/meshes_files.h"
+#include "tests/support/files/viewer_decoder.h"
 #include "tests/support/folders.h"
-#include "tests/support/formats_sample.h"
-#include "tests/support/meshes_files.h"
-#include "tests/support/viewer_decoder.h"
 
 namespace palpate::gallery_test {
 namespace {

@@ -16,8 +16,8 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/scene/drawn_picture.h"
 #include "runtime/viewer/wire.h"
-#include "tests/support/igtl_reader.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/igtl_reader.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::igtl_messages_test {

@@ -19,7 +19,7 @@
 
 #include "base/error.h"
 #include "runtime/igtl/igtl_messages.h"
-#include "tests/support/igtl_reader.h"
+#include "tests/support/files/igtl_reader.h"
 
 namespace palpate::igtl_server_test {
 namespace {

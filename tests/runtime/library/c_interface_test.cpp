@@ -30,8 +30,8 @@
 #include "runtime/core/tick/status.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/library/palpate.h"
+#include "tests/support/files/meshes_files.h"
 #include "tests/support/folders.h"
-#include "tests/support/meshes_files.h"
 
 namespace palpate::c_interface_test {
 namespace {

@@ -28,10 +28,10 @@
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/library/palpate.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/folders.h"
 #include "tests/support/live_session.h"
-#include "tests/support/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define PALPATE_OWN_MALLOC 0  // sanitizers have their own

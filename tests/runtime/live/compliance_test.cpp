@@ -10,8 +10,8 @@
 #include "runtime/background/motion_source.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/core/tick/surface_motion.h"
+#include "tests/support/bodies/thrown_bodies.h"
 #include "tests/support/live_session.h"
-#include "tests/support/thrown_bodies.h"
 
 namespace palpate::live_compliance_test {
 namespace {

@@ -7,9 +7,9 @@
 #include "base/error.h"
 #include "runtime/live/live_stepper.h"
 #include "statics/balance.h"
-#include "tests/support/dynamics_bodies.h"
-#include "tests/support/live_bodies.h"
-#include "tests/support/thrown_bodies.h"
+#include "tests/support/bodies/dynamics_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
+#include "tests/support/bodies/thrown_bodies.h"
 
 namespace palpate::live_steps_test {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "runtime/live/live_stepper.h"
-#include "tests/support/live_bodies.h"
-#include "tests/support/thrown_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
+#include "tests/support/bodies/thrown_bodies.h"
 
 namespace palpate::walls_test {
 namespace {

@@ -14,8 +14,8 @@
 #include "runtime/loop/loop.h"
 #include "runtime/loop/replay_device.h"
 #include "runtime/loop/settings.h"
-#include "tests/support/recorded_ticks.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/recorded_ticks.h"
 
 namespace palpate::device_loop_test {
 namespace {

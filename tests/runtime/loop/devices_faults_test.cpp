@@ -17,8 +17,8 @@
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loop.h"
 #include "runtime/loop/real_time.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/devices/fake_hidapi.h"
-#include "tests/support/runtime_model.h"
 
 namespace palpate::devices_faults_test {
 namespace {

@@ -20,7 +20,7 @@
 #include "runtime/loop/loop.h"
 #include "runtime/safety/safety.h"
 #include "runtime/safety/workspace.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers have their own malloc
 

@@ -20,8 +20,8 @@
 #include "base/error.h"
 #include "formats/recording.h"
 #include "runtime/app/script_device.h"
-#include "tests/support/recorded_ticks.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/recorded_ticks.h"
 
 namespace palpate::loop_test {
 namespace {

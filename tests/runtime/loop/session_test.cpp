@@ -23,7 +23,7 @@
 #include "runtime/loop/recorder.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::session_test {
 namespace {

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "runtime/body/patch_maker.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::scene_test {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/meshes_files.h"
+#include "tests/support/files/meshes_files.h"
 
 namespace palpate::book_files_test {
 namespace {

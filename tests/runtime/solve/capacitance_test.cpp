@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::capacitance_test {
 namespace {

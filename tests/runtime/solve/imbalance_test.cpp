@@ -12,7 +12,7 @@
 #include "runtime/core/solve/cone_solver.h"
 #include "runtime/core/solve/newton_krylov.h"
 #include "runtime/core/solve/tick_tuning.h"
-#include "tests/support/contact_grid.h"
+#include "tests/support/second_routes/contact_grid.h"
 
 namespace palpate::imbalance_test {
 namespace {

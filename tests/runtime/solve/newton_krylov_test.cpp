@@ -13,7 +13,7 @@
 #include "runtime/core/solve/active_set.h"
 #include "runtime/core/solve/contact_problem.h"
 #include "runtime/core/solve/tick_tuning.h"
-#include "tests/support/contact_grid.h"
+#include "tests/support/second_routes/contact_grid.h"
 
 namespace palpate::newton_krylov_test {
 namespace {

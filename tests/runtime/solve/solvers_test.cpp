@@ -7,7 +7,7 @@
 
 #include "runtime/core/solve/active_set.h"
 #include "runtime/core/solve/cone_solver.h"
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::solvers_test {
 namespace {

@@ -11,7 +11,7 @@
 #include "runtime/core/tick/step.h"
 #include "runtime/core/touch/tool_geometry.h"
 #include "runtime/core/touch/touching_pair.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::contact_disc_test {

@@ -12,7 +12,7 @@
 #include "meshes/generate.h"
 #include "runtime/core/solve/cone_solver.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::contact_friction_test {

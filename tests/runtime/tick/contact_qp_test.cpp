@@ -20,7 +20,7 @@
 #include "runtime/core/tick/contact_detection.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/core/touch/tool_geometry.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::contact_qp_test {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::contact_sliding_test {

@@ -12,7 +12,7 @@
 #include "base/vectors.h"
 #include "runtime/core/tick/hand_force.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::contact_tool_test {

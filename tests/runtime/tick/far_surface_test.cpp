@@ -8,7 +8,7 @@
 #include "runtime/body/body.h"
 #include "runtime/core/solve/tick_tuning.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate {
 namespace {

@@ -9,7 +9,7 @@
 #include "runtime/core/solve/tick_tuning.h"
 #include "runtime/core/tick/linearise.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::force_error_test {

@@ -13,7 +13,7 @@
 #include "runtime/core/solve/tick_tuning.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/core/touch/compliance.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::many_contacts_test {

@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::overlay_step_test {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "runtime/body/body.h"
 #include "runtime/core/tick/step.h"
-#include "tests/support/baked_body.h"
+#include "tests/support/bodies/baked_body.h"
 
 namespace palpate::precision_tick_test {
 namespace {

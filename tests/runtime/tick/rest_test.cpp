@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "runtime/core/tick/step.h"
-#include "tests/support/rest_cases.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/rest_cases.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::rest_test {

@@ -14,7 +14,7 @@
 #include "base/error.h"
 #include "base/vectors.h"
 #include "runtime/body/prescribed_nodes.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::step_test {
 namespace {

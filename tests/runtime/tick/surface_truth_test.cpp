@@ -1,6 +1,7 @@
 // Capsules and spheres that press and slide, tick by tick, against contact over the whole surface in double
-// precision (tests/support/surface_truth.h): none of the tick's detection, near field or solvers.
-#include "tests/support/surface_truth.h"
+// precision (tests/support/second_routes/surface_truth.h): none of the tick's detection, near field or
+// solvers.
+#include "tests/support/second_routes/surface_truth.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,7 @@
 #include <vector>
 
 #include "runtime/core/tick/step.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
 namespace palpate::surface_truth_test {

@@ -18,10 +18,10 @@
 #include "runtime/serving/admission.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/web/page.h"
-#include "tests/support/meshes_files.h"
-#include "tests/support/runtime_model.h"
-#include "tests/support/viewer_client.h"
-#include "tests/support/viewer_decoder.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/meshes_files.h"
+#include "tests/support/files/viewer_client.h"
+#include "tests/support/files/viewer_decoder.h"
 
 namespace palpate::server_test {
 namespace {

@@ -19,7 +19,7 @@
 #include "runtime/serving/http_guard.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/web/page.h"
-#include "tests/support/viewer_decoder.h"
+#include "tests/support/files/viewer_decoder.h"
 
 namespace palpate::session_test {
 namespace {

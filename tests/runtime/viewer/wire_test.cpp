@@ -14,8 +14,8 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/scene/node_order.h"
 #include "runtime/scene/seen_surface.h"
-#include "tests/support/runtime_model.h"
-#include "tests/support/viewer_decoder.h"
+#include "tests/support/bodies/runtime_model.h"
+#include "tests/support/files/viewer_decoder.h"
 
 namespace palpate::wire_test {
 namespace {

@@ -9,8 +9,8 @@
 #include "runtime/background/warped_motion.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/core/tick/surface_motion.h"
+#include "tests/support/bodies/warp_cases.h"
 #include "tests/support/live_session.h"
-#include "tests/support/warp_cases.h"
 
 namespace palpate::warped_tick_test {
 namespace {

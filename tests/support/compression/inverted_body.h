@@ -9,9 +9,9 @@
 #include "meshes/surface.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/scope.h"
+#include "tests/support/bodies/precompute_case.h"
 #include "tests/support/compression/clustered_body.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::test {
 

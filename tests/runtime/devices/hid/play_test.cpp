@@ -25,8 +25,8 @@
 #include "runtime/safety/fault.h"
 #include "runtime/safety/safety.h"
 #include "tests/support/devices/emulated_bus.h"
+#include "tests/support/files/recorded_ticks.h"
 #include "tests/support/folders.h"
-#include "tests/support/recorded_ticks.h"
 
 namespace palpate::play_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "meshes/element.h"
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::test {
 

@@ -1,4 +1,4 @@
-#include "tests/support/surface_truth.h"
+#include "tests/support/second_routes/surface_truth.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>

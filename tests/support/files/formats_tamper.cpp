@@ -1,4 +1,4 @@
-#include "tests/support/formats_tamper.h"
+#include "tests/support/files/formats_tamper.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "tests/support/partitioned_inverse.h"
+#include "tests/support/second_routes/partitioned_inverse.h"
 
 #include <cblas.h>
 #include <f77blas.h>

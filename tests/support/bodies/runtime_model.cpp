@@ -1,4 +1,4 @@
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -15,7 +15,7 @@
 #include "meshes/element.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::test {
 namespace {

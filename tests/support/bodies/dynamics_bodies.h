@@ -5,8 +5,8 @@
 
 #include "meshes/generate.h"
 #include "tests/integrators/integrators.h"
-#include "tests/support/dense_algebra.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/bodies/precompute_case.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::test {
 

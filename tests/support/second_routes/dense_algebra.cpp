@@ -1,4 +1,4 @@
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

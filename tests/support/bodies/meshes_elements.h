@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/gauss_rules.h"
+#include "tests/support/second_routes/gauss_rules.h"
 
 namespace palpate::test {
 

@@ -1,9 +1,9 @@
-#include "tests/support/dynamics_sample.h"
+#include "tests/support/bodies/dynamics_sample.h"
 
 #include <algorithm>
 #include <span>
 
-#include "tests/support/make_dynamics.h"
+#include "tests/support/bodies/make_dynamics.h"
 
 namespace palpate::test {
 

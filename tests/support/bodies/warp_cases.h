@@ -17,7 +17,7 @@
 #include "runtime/warp/body_warp.h"
 #include "runtime/warp/warped_model.h"
 #include "statics/balance.h"
-#include "tests/support/runtime_model.h"
+#include "tests/support/bodies/runtime_model.h"
 
 namespace palpate::test {
 

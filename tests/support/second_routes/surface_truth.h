@@ -10,7 +10,7 @@
 
 #include "runtime/body/body.h"
 #include "runtime/core/touch/tool.h"
-#include "tests/support/coulomb_solver.h"
+#include "tests/support/second_routes/coulomb_solver.h"
 
 namespace palpate::test {
 

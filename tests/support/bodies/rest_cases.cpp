@@ -1,4 +1,4 @@
-#include "tests/support/rest_cases.h"
+#include "tests/support/bodies/rest_cases.h"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tests/support/coulomb_solver.h"
+#include "tests/support/second_routes/coulomb_solver.h"
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/support/dense_algebra.h"
+#include "tests/support/second_routes/dense_algebra.h"
 
 namespace palpate::test {
 

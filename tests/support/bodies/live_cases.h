@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "statics/balance.h"
-#include "tests/support/live_bodies.h"
+#include "tests/support/bodies/live_bodies.h"
 
 namespace palpate::test {
 

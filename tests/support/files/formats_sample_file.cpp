@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "base/error.h"
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 int main(int count, char** arguments) {
   if (count != 2) return palpate::exit_usage;

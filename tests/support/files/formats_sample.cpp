@@ -1,4 +1,4 @@
-#include "tests/support/formats_sample.h"
+#include "tests/support/files/formats_sample.h"
 
 #include <stdlib.h>
 
