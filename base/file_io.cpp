@@ -198,11 +198,11 @@ std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t of
   if (base == MAP_FAILED) fail("map " + std::to_string(bytes) + " bytes", file.path(), errno);
   ::madvise(base, length, MADV_WILLNEED);
   NamedMapping* const named = name_mapping(base, length, file.path());
-  const std::shared_ptr<const void> owner(base, [length, named](void* p) {
+  const std::shared_ptr<const void> mapping(base, [length, named](void* p) {
     if (named != nullptr) named->forget();
     ::munmap(p, length);
   });
-  return {owner, static_cast<const char*>(base) + lead};
+  return {mapping, static_cast<const char*>(base) + lead};
 }
 
 const char* mapped_file_at(const void* address) noexcept {
