@@ -34,6 +34,7 @@ std::string too_large(const Tool& tool, double size) {
 }
 
 std::string too_small(const Tool& tool, const Body& body) {
+  if (body.local() != nullptr) return "";
   const double edge = body.mean_surface_edge();
   const double radius = std::max(tool.radius, tool.disc_radius);
   if (!(radius > 0.0))
@@ -48,8 +49,7 @@ std::string too_small(const Tool& tool, const Body& body) {
 }
 
 void tell_small_tool(const std::string& note) {
-  if (!note.empty())
-    say(stderr, "{}; a larger tool, --overlay auto, a finer mesh or tet10 are truer\n", note);
+  if (!note.empty()) say(stderr, "{}; a larger tool, a finer mesh or tet10 are truer\n", note);
 }
 
 void settle_tool(PlayOptions& options, const Body& body) {

@@ -47,8 +47,9 @@ Json json_tool(const Tool& tool) {
 
 Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   const PatchCounts& counts = overlays.counts();
-  Json json = options.is_auto ? Json{{"auto", true}}
-                              : Json{{"refinement", options.refinement}, {"rings", options.rings}};
+  Json json = options.kind == OverlayKind::graded
+                  ? Json{{"graded", true}}
+                  : Json{{"refinement", options.refinement}, {"rings", options.rings}};
   json.update({{"built", overlays.built()},
                {"failed", overlays.failed()},
                {"longest_build_s", overlays.longest_build()},
@@ -235,7 +236,7 @@ std::string json_report(const PlayedRun& run) {
   json["device"] = json_device(run);
   if (run.settings.safety) json["safety"] = json_safety(report);
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
-  if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
+  if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay);
   json["dynamics"] = json_dynamics(run.body, run.motion);
   if (const LiveMotion* live = run.live()) json["live"] = json_live(run.body, live->telling(), run.report);
   if (const WarpedMotion* warped = run.warped()) json["warp"] = json_warp(warped->telling());

@@ -27,11 +27,16 @@ Tool tool_of(const Settings& settings, const Body& body) {
   return tool;
 }
 
+bool has_patches(const Settings& settings, const Body& body) {
+  return body.refinement() > 1 && settings.overlay.has_patches();
+}
+
 State state_of(const Settings& settings, const Body& body, const Tool& tool) {
-  return State(body, {.tools = {tool},
-                      .max_contacts = settings.max_contacts,
-                      .patch_nodes = body.refinement() > 1 ? patch_room(body, settings.overlay->rings, 1) : 0,
-                      .tick = 1.0 / static_cast<double>(settings.rate)});
+  return State(body,
+               {.tools = {tool},
+                .max_contacts = settings.max_contacts,
+                .patch_nodes = has_patches(settings, body) ? patch_room(body, settings.overlay.rings, 1) : 0,
+                .tick = 1.0 / static_cast<double>(settings.rate)});
 }
 
 void warn_of_slow_steps(const Body& body) {
@@ -60,10 +65,10 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
     safety_.emplace(*settings.safety);
   }
   const bool in_background = !options_.fast && !options_.session;
-  if (body.refinement() > 1) {
+  if (has_patches(settings, body)) {
     if (options_.session) check_overlays(*options_.session, body);
     overlays_.emplace(body, state_,
-                      PatchSourceOptions{.rings = settings.overlay->rings,
+                      PatchSourceOptions{.rings = settings.overlay.rings,
                                          .finest = settings.finest(),
                                          .law = settings.overlay_law,
                                          .memory = settings.overlay_memory,
@@ -86,7 +91,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
         });
   }
   if (recorder_ && options_.record_frames > 0.0) {
-    const bool contacts_only = pictures_follow_from_contacts(body);
+    const bool contacts_only = !overlays_ && pictures_follow_from_contacts(body);
     frames_.emplace(
         body, state_,
         SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),

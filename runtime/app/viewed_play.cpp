@@ -136,7 +136,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
     paths.add(plan.record, OutputKind::recording, "record");
   }
   print_device(input_, options.settings);
-  if (options.settings.overlay) begin_making("the overlay is being made");
+  if (options.settings.overlay.has_patches()) begin_making("the overlay is being made");
   const SettingsText settled = options.settings_text;
   const Tool settled_tool = options.settings.tool;
   {
@@ -343,14 +343,14 @@ void ViewedPlay::check(const Settings& settings) const {
     throw Error("the file has no dynamics, which dynamic contact needs", "--contact",
                 "add [dynamics] to its model.toml and precompute it again");
   }
-  if (settings.overlay && settings.overlay->rings > most_rings_) {
+  if (settings.overlay.has_patches() && settings.overlay.rings > most_rings_) {
     throw Error(most_rings_ == 0
                     ? "the file keeps no layers below the surface, which overlays need"
                     : fmt::format("the file keeps layers below the surface for at most {} rings, not {}",
-                                  most_rings_, settings.overlay->rings),
+                                  most_rings_, settings.overlay.rings),
                 "--overlay",
                 fmt::format("{}precompute it with [storage] layers = {}",
-                            most_rings_ == 0 ? "" : "take fewer rings, or ", settings.overlay->rings));
+                            most_rings_ == 0 ? "" : "take fewer rings, or ", settings.overlay.rings));
   }
   const std::string problem = too_large(settings.tool, size_);
   if (!problem.empty()) throw Error(problem, "--tool", "take a smaller one");

@@ -1,5 +1,6 @@
 #include "runtime/background/picture_maker.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <map>
@@ -9,9 +10,20 @@
 
 namespace palpate {
 
+namespace {
+
+/// Sorts numbers, and leaves each once.
+void sort_out(std::vector<Index>& numbers) {
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+}
+
+}  // namespace
+
 bool pictures_follow_from_contacts(const Body& body) noexcept {
   return body.live() == nullptr && body.contact_model() == ContactModel::quasi_static &&
-         body.model().dynamics.method == DynamicsMethod::none && body.refinement() == 1;
+         body.model().dynamics.method == DynamicsMethod::none &&
+         (body.refinement() == 1 || body.local() != nullptr);
 }
 
 ContactLoads contact_loads(std::span<const NodalForce> forces, std::span<const NodalPress> presses) {
@@ -54,6 +66,29 @@ void PictureMaker::show(const SurfaceLoad& load, const MotionSnapshot* motion,
   show_pressure(presses, frame);
 }
 
+std::shared_ptr<const Patch> PictureMaker::fine_part(const SurfaceLoad& load) {
+  if (load.local_now() == nullptr || load.point_count == 0 || body_.refinement() == 1) return nullptr;
+  if (part_ != nullptr && box_of_part_.contains(load.points_box)) return part_;
+  const Vec3 beside = Vec3::Constant(0.25 * load.local->reach());
+  box_of_part_ = {load.points_box.min() - beside, load.points_box.max() + beside};
+  const Eigen::AlignedBox3d box(box_of_part_.min() - beside, box_of_part_.max() + beside);
+  const FineSurface& fine = body_.fine_surface();
+  const auto corners = [&](std::size_t simplex) { return body_.simplices().subspan(3 * simplex, 3); };
+  Patch::Parts parts;
+  for (std::size_t simplex = 0; simplex < fine.element.size(); ++simplex) {
+    if (box.contains(load.local->point(corners(simplex)[0]).x))
+      parts.elements.push_back(fine.element[simplex]);
+  }
+  sort_out(parts.elements);
+  for (std::size_t simplex = 0; simplex < fine.element.size(); ++simplex) {
+    if (!std::binary_search(parts.elements.begin(), parts.elements.end(), fine.element[simplex])) continue;
+    for (const Index node : corners(simplex)) parts.surface_nodes.push_back(node);
+  }
+  sort_out(parts.surface_nodes);
+  part_ = std::make_shared<const Patch>(std::move(parts));
+  return part_;
+}
+
 void PictureMaker::show_stress(std::span<const NodalForce> forces, const Patch* patch, SurfaceFrame& frame) {
   for (const NodalForce& loaded : forces) force_[loaded.node] += loaded.force;
   stress_.evaluate(u_, force_, patch, nodal_stress_);
@@ -72,7 +107,7 @@ void PictureMaker::show_pressure(std::span<const NodalPress> presses, SurfaceFra
 
 SurfaceFrame PictureMaker::picture(const ContactLoads& loads) {
   const auto count = static_cast<Index>(loads.node.size());
-  SurfaceLoad load(body_.dimension(), 0, count, 0);
+  SurfaceLoad load(body_, count, body_.most_surface_parts() * count, 0);
   std::vector<NodalForce> forces;
   std::vector<NodalPress> presses;
   for (std::size_t k = 0; k < loads.node.size(); ++k) {
@@ -83,8 +118,12 @@ SurfaceFrame PictureMaker::picture(const ContactLoads& loads) {
     const float* f = loads.force.data() + 3 * k;
     forces.push_back({node, Vec3(f[0], f[1], f[2])});
     presses.push_back({node, loads.press[k]});
+    load.add_point(node, forces.back().force);
     const SurfaceParts parts = body_.surface_parts(node);
-    if (!parts.stored.empty()) load.add(parts.stored.front(), forces.back().force.data());
+    for (std::size_t part = 0; part < parts.stored.size(); ++part) {
+      const Vec3 shared = parts.weights[part] * forces.back().force;
+      load.add(parts.stored[part], shared.data());
+    }
   }
   SurfaceFrame frame{.tick = loads.tick, .time = loads.time};
   show(load, nullptr, forces, presses, frame);

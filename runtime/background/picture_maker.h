@@ -13,7 +13,7 @@
 namespace palpate {
 
 /// True if a picture follows from the contact forces alone: the body is displaced by its Green's functions,
-/// without dynamics, warp or overlay.
+/// without dynamics, warp or the patches of an overlay.
 [[nodiscard]] bool pictures_follow_from_contacts(const Body& body) noexcept;
 
 /// Normal force of a closed contact point on a surface node [N].
@@ -44,6 +44,10 @@ class PictureMaker {
   /// [n] displacement of the stored nodes in the last picture [m].
   [[nodiscard]] std::span<const double> stored_displacement() const noexcept { return stored_; }
 
+  /// The elements round the forces, which are to be drawn as finely as tools meet them where that is finer
+  /// than the body and there is no patch; null: none.
+  [[nodiscard]] std::shared_ptr<const Patch> fine_part(const SurfaceLoad& load);
+
   /// Returns a picture of a recording, for a body with `pictures_follow_from_contacts`. Throws Error if a
   /// node is not on the surface.
   [[nodiscard]] SurfaceFrame picture(const ContactLoads& loads);
@@ -57,8 +61,10 @@ class PictureMaker {
   std::vector<double> stored_;  // [n]
   std::vector<Vec3> u_;         // [S] u, then u0 + u
   SurfaceStress stress_;
-  std::vector<Vec3> force_;           // [S] contact forces
-  std::vector<Stress> nodal_stress_;  // [S]
+  std::vector<Vec3> force_;            // [S] contact forces
+  std::vector<Stress> nodal_stress_;   // [S]
+  std::shared_ptr<const Patch> part_;  // of the last picture
+  Eigen::AlignedBox3d box_of_part_;    // forces within it keep the part
 };
 
 }  // namespace palpate

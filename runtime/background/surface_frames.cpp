@@ -143,7 +143,7 @@ void SurfaceFrames::compute(const Moment& moment) {
     return sink_(std::move(picture));
   }
   static_cast<SeenTool&>(picture) = moment.seen;
-  picture.patch = moment.load.patch;
+  picture.patch = moment.load.patch != nullptr ? moment.load.patch : maker_->fine_part(moment.load);
   picture.frame.tick = moment.tick;
   picture.frame.time = moment.time;
   maker_->show(moment.load, &moment.motion, forces, presses, picture.frame);

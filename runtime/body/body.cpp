@@ -152,6 +152,17 @@ void follow_body(const FineSurface& fine, const Model& model, const std::vector<
   }
 }
 
+/// What the local compliance is found from.
+LocalParts local_parts(const Model& model, const FineSurface& fine) {
+  LocalParts local{.simplices = number_surface(model.surface, model.mesh.nodes.size()).simplices};
+  for (const Index element : fine.element) {
+    const Material& material = model.materials[model.material_of_element[element]];
+    local.youngs_modulus.push_back(material.youngs_modulus);
+    local.poissons_ratio.push_back(material.poissons_ratio);
+  }
+  return local;
+}
+
 }  // namespace
 
 struct Body::Made {
@@ -163,7 +174,7 @@ struct Body::Made {
 };
 
 Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
-                      bool rounded) {
+                      bool local) {
   BodyParts parts{.name = model.name,
                   .greens = take_greens(model, options, contact),
                   .contact_model = contact,
@@ -179,7 +190,7 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   for (std::size_t k = 0; k < model.stored_nodes.size(); ++k)
     stored_of_mesh[model.stored_nodes[k]] = static_cast<Index>(k);
   std::shared_ptr<const Rounding> rounding;
-  if (rounded) rounding = std::make_shared<const Rounding>(model.mesh);
+  if (local && refinement > 1) rounding = std::make_shared<const Rounding>(model.mesh);
   FineSurface fine =
       refinement > 1 ? make_fine_surface(model, refinement, rounding.get()) : surface_as_it_is(model);
   order_by_last_part(fine, stored_of_mesh);
@@ -187,6 +198,8 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   parts.simplices = fine.simplices;
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
+  if (local && model.dimension() == 3 && contact == ContactModel::quasi_static)
+    parts.local = local_parts(model, fine);
   return {std::move(parts), std::move(model), std::move(stored_of_mesh), std::move(fine),
           std::move(rounding)};
 }
@@ -198,8 +211,8 @@ Body::Body(Made made)
       fine_(std::move(made.fine)),
       rounding_(std::move(made.rounding)) {}
 
-Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool rounded)
-    : Body(make(std::move(model), options, refinement, contact, rounded)) {}
+Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool local)
+    : Body(make(std::move(model), options, refinement, contact, local)) {}
 
 Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options)
     : Body(std::move(model), options, 1, ContactModel::live) {

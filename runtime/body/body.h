@@ -19,11 +19,11 @@ class Body : public ElasticBody {
  public:
   /// Takes over the model and unfolds its Green's functions. The contact surface consists of the elements'
   /// facets, each element divided into r^d for `refinement` r > 1, as in the overlays to be used, on flat
-  /// facets or `rounded` (Rounding). Throws
-  /// Error if no free surface node is stored, since the body could not be touched, if the sizes of the
-  /// model's parts are inconsistent, or for dynamic contact with a model without dynamics.
+  /// facets. `local`: with a LocalCompliance, if in space and quasi-static, and rounded (Rounding) if
+  /// refined. Throws Error if no free surface node is stored, since the body could not be touched, if the
+  /// sizes of the model's parts are inconsistent, or for dynamic contact with a model without dynamics.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
-                ContactModel contact = ContactModel::quasi_static, bool rounded = false);
+                ContactModel contact = ContactModel::quasi_static, bool local = false);
   /// Body that is solved during the touch; `live` comes from `live_model` of the same model.
   Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options = {});
 
@@ -55,7 +55,7 @@ class Body : public ElasticBody {
  private:
   struct Made;
   static Made make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
-                   bool rounded);
+                   bool local);
   explicit Body(Made made);
 
   Model model_;

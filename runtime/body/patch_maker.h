@@ -8,12 +8,21 @@
 
 namespace palpate {
 
+/// What makes the body finer under the tools.
+enum class OverlayKind : std::uint8_t {
+  none,    ///< nothing
+  local,   ///< no mesh: LocalCompliance, on a rounded surface, if the body's mesh is too coarse for the tools
+  graded,  ///< besides, where they are ready, meshes graded by the tools' radii (PatchMaker)
+  uniform  ///< elements cut alike
+};
+
 /// Refinement and reach of overlays.
 struct OverlayOptions {
-  int refinement = 3;  ///< r: each element is divided into r^d
+  OverlayKind kind = OverlayKind::local;
+  int refinement = 3;  ///< r: each element is divided into r^d, if uniform
   int rings = 2;       ///< rings of elements around the centres
-  bool is_auto =
-      false;  ///< graded by the tools' radii instead (PatchMaker), if the mesh is too coarse for them
+
+  [[nodiscard]] bool has_patches() const noexcept { return kind >= OverlayKind::graded; }
 };
 
 /// Makes patches around nodes of a body's surface. For one thread at a time.

@@ -165,8 +165,10 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
   settings.reach = std::max(tool.reach, std::numeric_limits<double>::min());  // 0 is not allowed there
   settings.max_contacts = options.max_contacts;
   settings.contact = contact;
-  if (overlay.refinement > 1)
-    settings.overlay = OverlayOptions{.refinement = overlay.refinement, .rings = overlay.rings};
+  settings.overlay = overlay.refinement > 1 ? OverlayOptions{.kind = OverlayKind::uniform,
+                                                             .refinement = overlay.refinement,
+                                                             .rings = overlay.rings}
+                                            : OverlayOptions{.kind = OverlayKind::none};
   settings.overlay_memory = overlay.memory;
   settings.rate = whole_rate(options.tick);
   return settings;

@@ -49,18 +49,26 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
-/// Refinement of a rounded surface whose overlays have edges of `finest`; 1 if the mesh's are no longer.
-int refinement_for(const Model& model, double finest) {
-  constexpr double contact_spacing = 0.43;  // [finest] between the nodes that tools meet
-  if (traits(model.mesh.element).corners != model.dimension() + 1) return 1;
+/// Mean edge of the surface [m]; of tet10 half of an element's.
+double surface_edge(const Model& model) {
   const auto d = static_cast<std::size_t>(model.dimension());
   double sum = 0.0;
   for (std::size_t s = 0; s < model.surface.size(); s += d)
     sum += (model.mesh.nodes[model.surface[s]] - model.mesh.nodes[model.surface[s + 1]]).norm();
-  const double edge = sum / static_cast<double>(model.surface.size() / d);  // of tet10 half of an edge
-  if (edge * (model.mesh.element == ElementType::tet10 ? 2.0 : 1.0) <= finest) return 1;
-  return std::clamp(static_cast<int>(std::ceil(edge / (contact_spacing * finest))), least_refinement,
-                    most_refinement);
+  return sum / static_cast<double>(model.surface.size() / d);
+}
+
+/// Refinement of the surface for a tool of this radius; 1 if the mesh is fine enough for it.
+int refinement_for(const Model& model, double radius) {
+  constexpr double spacing = 0.15;     // [radius] between the nodes that the tool meets
+  constexpr double fine_enough = 0.2;  // [radius] edges
+  constexpr double most_nodes = 4e5;   // some 150 bytes each, and a second of loading
+  const double edge = surface_edge(model);
+  if (edge <= fine_enough * radius) return 1;
+  const auto most = static_cast<int>(std::sqrt(most_nodes / (0.5 * static_cast<double>(model.surface.size()) /
+                                                             static_cast<double>(model.dimension()))));
+  return std::min({std::max(static_cast<int>(std::ceil(edge / (spacing * radius))), least_refinement),
+                   std::max(most, 1), most_refinement});
 }
 
 /// Refuses settings that a warped body does not support.
@@ -77,9 +85,9 @@ void check_warp(const BodyOptions& options) {
 /// Checks that a model fits neo-Hookean overlays, and drops the data that they do not use.
 void prepare_for_law(Model& model, const BodyOptions& options) {
   if (options.refinement == 1) {
-    throw Error(options.finest > 0.0 ? "graded overlays are linear"
-                                     : "the law is that of overlays, and there is none",
-                "--overlay-law", "give an --overlay r=R,rings=N, or leave out --overlay-law");
+    throw Error(
+        options.graded ? "graded overlays are linear" : "the law is that of overlays, and there is none",
+        "--overlay-law", "give an --overlay r=R,rings=N, or leave out --overlay-law");
   }
   if (options.contact == ContactModel::dynamic) {
     throw Error("a body whose overlays are neo-Hookean has no inertia", "--contact",
@@ -132,8 +140,11 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   if (options.warp) {
     return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   }
-  const int by_edges = options.finest > 0.0 ? refinement_for(model, options.finest) : 1;
-  return Body(std::move(model), {}, std::max(options.refinement, by_edges), options.contact, by_edges > 1);
+  const bool by_radius = options.radius > 0.0 &&
+                         traits(model.mesh.element).corners == model.dimension() + 1 &&
+                         (options.graded || model.dimension() == 3);
+  const int refinement = by_radius ? refinement_for(model, options.radius) : options.refinement;
+  return Body(std::move(model), {}, refinement, options.contact, by_radius && refinement > 1);
 }
 
 void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {

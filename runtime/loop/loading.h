@@ -14,7 +14,9 @@ namespace palpate {
 /// Options for making a body from a file.
 struct BodyOptions {
   int refinement = 1;   ///< refinement of the surface, see Body
-  double finest = 0.0;  ///< [m] if not 0: rounded, with edges of at most this if the mesh's are longer
+  double radius = 0.0;  ///< [m] if not 0: of a tool, for which its compliance is local (LocalCompliance) and
+                        ///< its surface round and fine, if its mesh is coarse
+  bool graded = false;  ///< there are graded overlays for that tool
   PatchLaw overlay_law = PatchLaw::linear;
   ContactModel contact = ContactModel::quasi_static;
   double load_scale = 1.0;  ///< see scale_loads
@@ -22,7 +24,7 @@ struct BodyOptions {
   LiveSettings live{};
   bool warp = false;  ///< Green's functions rotate with the body, see SurfaceWarp
 
-  [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || finest > 0.0; }
+  [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || graded; }
   bool operator==(const BodyOptions&) const = default;
 };
 

@@ -61,7 +61,9 @@ std::string text_of(bool yes) {
   return yes ? "yes" : "no";
 }
 std::string text_of(const OverlayOptions& overlay) {
-  if (overlay.is_auto) return "auto";
+  if (overlay.kind == OverlayKind::none) return "no";
+  if (overlay.kind == OverlayKind::local) return "auto";
+  if (overlay.kind == OverlayKind::graded) return "graded";
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
 }
 std::string text_of(const Vec3& place) {
@@ -239,13 +241,15 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                 "factor on all Young's moduli, exact, without precomputing again", positive_number,
                 s.stiffness_scale != 1.0},
         s.stiffness_scale);
-  visit(Setting{"overlay", group, "auto|r=R,rings=N", "", "none",
+  visit(Setting{"overlay", group, "auto|no|graded|r=R,rings=N", "", "auto",
                 fmt::format(
-                    "a finer mesh under the tool (s-FEM): auto, one that is graded by the tool's radius, "
-                    "round and quadratic, if the body's is too coarse for it; or each element within N "
-                    "rings, from 1 to {}, cut into R to the power of the dimension, R from {} to {}",
+                    "what a tool feels that is small for the mesh: auto, the body's own compliance close to "
+                    "the tool in place of its mesh's, on a round surface; no, the mesh's; graded, besides "
+                    "auto a finer mesh under the tool (s-FEM) that is graded by its radius and quadratic; or "
+                    "each element within N rings, from 1 to {}, cut into R to the power of the dimension, R "
+                    "from {} to {}",
                     most_rings, least_refinement, most_refinement),
-                any_number, s.overlay.has_value()},
+                any_number, s.overlay.kind != OverlayKind::local},
         s.overlay);
   visit(Setting{"overlay-law", group, "linear|neo-hookean", "", "linear",
                 "how the finer mesh answers deformation: linear, as the body around it, or neo-hookean, for "
@@ -253,7 +257,7 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                 any_number, s.overlay_law != PatchLaw::linear},
         s.overlay_law);
   visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most memory that overlays may use", megabytes,
-                s.overlay.has_value()},
+                s.overlay.has_patches()},
         s.overlay_memory);
   visit(
       Setting{"warp", group, "yes|no", "", "no",

@@ -28,9 +28,9 @@ struct Settings {
   std::optional<double> reach;  ///< [m]; default: the longest edge of the surface
   Index max_contacts = 256;
   ContactModel contact = ContactModel::quasi_static;
-  double load_scale = 1.0;                ///< factor on the file's loads
-  double stiffness_scale = 1.0;           ///< factor on all Young's moduli
-  std::optional<OverlayOptions> overlay;  ///< empty: the body's own mesh
+  double load_scale = 1.0;       ///< factor on the file's loads
+  double stiffness_scale = 1.0;  ///< factor on all Young's moduli
+  OverlayOptions overlay;
   PatchLaw overlay_law = PatchLaw::linear;
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   bool warp = false;                                         ///< Green's functions rotate with the body
@@ -44,6 +44,8 @@ struct Settings {
 
   [[nodiscard]] WorkspaceOptions workspace() const;
   [[nodiscard]] BodyOptions body() const;
+  /// Radius by which the tool is large or small [m]; 0 of a point.
+  [[nodiscard]] double radius() const;
   /// Longest edge of graded overlays where the tool touches [m]; 0 if there are none.
   [[nodiscard]] double finest() const;
 };

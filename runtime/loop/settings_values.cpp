@@ -25,8 +25,12 @@ WorkspaceOptions Settings::workspace() const {
 }
 
 BodyOptions Settings::body() const {
-  return {.refinement = overlay && !overlay->is_auto ? overlay->refinement : 1,
-          .finest = finest(),
+  const bool is_static = contact == ContactModel::quasi_static && !live.solver && !warp;
+  const bool by_radius = overlay.kind == OverlayKind::graded ||
+                         (overlay.kind == OverlayKind::local && is_static && overlay_law == PatchLaw::linear);
+  return {.refinement = overlay.kind == OverlayKind::uniform ? overlay.refinement : 1,
+          .radius = by_radius ? radius() : 0.0,
+          .graded = overlay.kind == OverlayKind::graded,
           .overlay_law = overlay_law,
           .contact = contact,
           .load_scale = load_scale,
@@ -66,14 +70,19 @@ Tool parse_shape(const std::string& text) {
   return tool;
 }
 
+double Settings::radius() const {
+  return tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius;
+}
+
 double Settings::finest() const {
-  if (!overlay || !overlay->is_auto) return 0.0;
-  return edge_per_radius * (tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius);
+  return overlay.kind == OverlayKind::graded ? edge_per_radius * radius() : 0.0;
 }
 
 OverlayOptions parse_overlay(const std::string& text, const std::string& where) {
-  OverlayOptions overlay;
-  if (text == "auto") return {.rings = 1, .is_auto = true};
+  OverlayOptions overlay{.kind = OverlayKind::uniform};
+  if (text == "no") return {.kind = OverlayKind::none};
+  if (text == "auto") return {};
+  if (text == "graded") return {.kind = OverlayKind::graded, .rings = 1};
   for (const std::string_view part : split_commas(text)) {
     const auto [name, number] = split_named(part);
     const std::optional<Index> value = parse_index(std::string(number));
@@ -84,7 +93,7 @@ OverlayOptions parse_overlay(const std::string& text, const std::string& where) 
     } else {
       throw Error(fmt::format("'{}' is neither r={} to r={} nor rings=1 to rings={}", part, least_refinement,
                               most_refinement, most_rings),
-                  where, "write auto, or for instance r=3,rings=2");
+                  where, "write auto, no, graded, or for instance r=3,rings=2");
     }
   }
   return overlay;

@@ -12,6 +12,7 @@
 #include "matrices/newmark.h"
 #include "runtime/core/body/aggregates.h"
 #include "runtime/core/body/greens.h"
+#include "runtime/core/body/local_compliance.h"
 #include "runtime/core/body/node_runs.h"
 
 namespace palpate {
@@ -61,6 +62,7 @@ struct BodyParts {
   std::vector<Index> first_part = {0};  ///< [S + 1] of each surface node in the next two
   std::vector<Index> part_stored{};     ///< stored nodes that it follows, ascending
   std::vector<double> part_weight{};    ///< SurfaceParts::weights
+  LocalParts local{};                   ///< empty: contact meets the mesh's compliance
 };
 
 /// The constant side of a tick: the body's Green's functions as the tick wants them, its surface, and
@@ -77,6 +79,8 @@ class ElasticBody {
   [[nodiscard]] const Greens& greens() const noexcept { return *greens_; }
   [[nodiscard]] const std::shared_ptr<const Greens>& shared_greens() const noexcept { return greens_; }
   [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
+  /// The body's own compliance close to a contact; null: the mesh's.
+  [[nodiscard]] const std::shared_ptr<const LocalCompliance>& local() const noexcept { return local_; }
   /// Null unless the dynamics are modal.
   [[nodiscard]] const Modes* modes() const noexcept { return modes_.get(); }
 
@@ -180,6 +184,7 @@ class ElasticBody {
   double longest_surface_edge_ = 0.0;
   double mean_surface_edge_ = 0.0;
   Eigen::AlignedBox3d bounds_;
+  std::shared_ptr<const LocalCompliance> local_;
 };
 
 }  // namespace palpate

@@ -109,7 +109,8 @@ void surface_displacement(const ElasticBody& body, const SurfaceLoad& load, std:
   if (moves) add_motion(body, *motion, stored);
   for (std::size_t node = 0; node < u.size(); ++node) {
     u[node] =
-        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); });
+        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); }) +
+        load.local_displacement(static_cast<Index>(node));
   }
   if (load.patch == nullptr) return;
   const std::span<const Index> nodes = load.patch->surface_nodes();

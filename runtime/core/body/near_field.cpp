@@ -35,7 +35,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
       members_{std::vector<Index>(at(capacity)), std::vector<Index>(at(most_members_ * capacity)),
                std::vector<double>(at(most_members_ * capacity)),
                std::vector<Eigen::Matrix3d>(at(most_members_ * capacity))},
-      load_(dimension_, capacity, followed_.room(), patch_nodes) {
+      load_(body, std::max<Index>(most_members_, 1) * capacity, followed_.room(), patch_nodes) {
   beside_.room = patch_nodes;
   beside_.stride = (static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8;
   beside_.place_in_patch.assign(place_.size(), -1);
@@ -356,7 +356,17 @@ void NearField::displace() noexcept {
         palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
     }
     if (patch() != nullptr) load_patch(place);
+    if (load_.local_now() == nullptr) continue;
+    const Vec3 force = vector_at(force_, dimension_, place);
+    if (is_group(place)) {
+      for_each_member(place, [&](Index member, double, const Eigen::Matrix3d& map) {
+        load_.add_point(member, map * force);
+      });
+    } else {
+      load_.add_point(node(place), force);
+    }
   }
+  load_.lump_points();
   spread(force_);
   if (patch() != nullptr && patch()->has_offset())
     palpate::add(patch()->offset_forces().data(), 1.0, beside_.force.data(), patch_dofs());

@@ -21,10 +21,10 @@ namespace palpate {
 ///
 /// With a patch, Xi is that of the body with the overlay. Between surface nodes of the patch it is the
 /// patch's compliance, between them (H) and others (X = Xi_Q, by forces there without the overlay) it is H X,
-/// and between others Xi + X^T M X (theory.md section 4). A group of surface nodes
-/// (ElasticBody::aggregate_node) has a place like a node: its displacement is a mean of its members', its
-/// force acts on all of them with the same weights. There are no groups with a patch. All memory is allocated
-/// at construction.
+/// and between others Xi + X^T M X (theory.md section 4). Without one, a local compliance of the body counts.
+/// A group of surface nodes (ElasticBody::aggregate_node) has a place like a node: its displacement is a mean
+/// of its members', its force acts on all of them with the same weights. There are no groups with a patch.
+/// All memory is allocated at construction.
 class NearField {
  public:
   /// Empty, with a capacity of `capacity` nodes and of patches of up to `patch_nodes` nodes g.
@@ -126,6 +126,7 @@ class NearField {
   void connect_to_group(Index group, const double* by, double* block) const noexcept;
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const ElasticBody& body, Index place) noexcept;
+  void add_local(const LocalCompliance& local, Index place) noexcept;
   void respond(const ElasticBody& body, Index place) noexcept;
   void respond_within(Index place) noexcept;
   [[nodiscard]] const double* compliance_row(Index place, Index axis) noexcept;

@@ -156,6 +156,26 @@ void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexc
       }
     }
   }
+  if (load_.local_now() != nullptr) add_local(*load_.local_now(), place);
+}
+
+/// Adds the local compliance between a node and those before it.
+void NearField::add_local(const LocalCompliance& local, Index place) noexcept {
+  const std::ptrdiff_t d = dimension_, width = d * (place + 1);
+  for (Index other = 0; other <= place; ++other) {
+    Mat3 B = Mat3::Zero();
+    if (is_group(other)) {
+      for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
+        B += local.between(node(place), member) * map;
+      });
+    } else {
+      B = local.between(node(place), node(other));
+    }
+    for (std::ptrdiff_t i = 0; i < d; ++i) {
+      for (std::ptrdiff_t j = 0; j < d; ++j)
+        work_.blocks[at(static_cast<Index>(i * width + d * other + j))] += B(i, j);
+    }
+  }
 }
 
 }  // namespace palpate

@@ -14,21 +14,27 @@ std::size_t dofs(int dimension, Index nodes) noexcept {
 
 }  // namespace
 
-SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, Index patch_nodes)
-    : dimension(d),
+SurfaceLoad::SurfaceLoad(const ElasticBody& body, Index near_nodes, Index stored_nodes, Index patch_nodes)
+    : dimension(body.dimension()),
       node(static_cast<std::size_t>(stored_nodes + patch_nodes)),
-      force(dofs(d, stored_nodes + patch_nodes)),
+      force(dofs(dimension, stored_nodes + patch_nodes)),
+      local(body.local()),
+      point(static_cast<std::size_t>(local != nullptr ? near_nodes : 0)),
+      point_force(point.size()),
       patch_place(static_cast<std::size_t>(patch_nodes > 0 ? std::max(near_nodes, Patch::most_nodes) : 0)),
-      patch_force(dofs(d, static_cast<Index>(patch_place.size()))),
+      patch_force(dofs(dimension, static_cast<Index>(patch_place.size()))),
       first_force(static_cast<std::size_t>(patch_nodes > 0 ? Patch::most_nodes : 0), -1),
-      beside(dofs(d, patch_nodes)) {}
+      beside(dofs(dimension, patch_nodes)) {}
 
 const Greens& SurfaceLoad::greens(const ElasticBody& body) const noexcept {
+  if (local_now() != nullptr) return local->smooth();
   return compliance != nullptr ? *compliance : body.greens();
 }
 
 void SurfaceLoad::clear() noexcept {
   count = 0;
+  point_count = 0;
+  points_box.setEmpty();
   for (Index i = 0; i < patch_count; ++i) {
     if (patch_place[i] < Patch::most_nodes) first_force[patch_place[i]] = -1;
   }
@@ -40,6 +46,56 @@ void SurfaceLoad::add(Index stored, const double* f) noexcept {
   node[count] = stored;
   std::copy_n(f, dimension, force.data() + dofs(dimension, count));
   ++count;
+}
+
+void SurfaceLoad::add_point(Index surface_node, const Vec3& f) noexcept {
+  if (local_now() == nullptr) return;
+  point[static_cast<std::size_t>(point_count)] = surface_node;
+  point_force[static_cast<std::size_t>(point_count)] = f;
+  points_box.extend(local->point(surface_node).x);
+  ++point_count;
+}
+
+void SurfaceLoad::lump_points() noexcept {
+  if (point_count == 0) return;
+  std::array<double, 8> sum{};
+  std::fill(lump_force.begin(), lump_force.end(), Vec3::Zero());
+  const Vec3 middle = points_box.center();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(point_count); ++k) {
+    const LocalCompliance::Point& p = local->point(point[k]);
+    const double weight = point_force[k].norm();
+    if (weight == 0.0) continue;
+    const std::size_t eighth = (p.x.x() > middle.x() ? 1U : 0U) + (p.x.y() > middle.y() ? 2U : 0U) +
+                               (p.x.z() > middle.z() ? 4U : 0U);
+    sum[eighth] += weight;
+    const Vec3 x = lump[eighth].x + weight / sum[eighth] * (p.x - lump[eighth].x);
+    lump[eighth] = p;
+    if (sum[eighth] > weight) lump[eighth].x = x;
+    lump_force[eighth] += point_force[k];
+  }
+}
+
+bool SurfaceLoad::is_in_local_reach(Index surface_node) const noexcept {
+  return point_count > 0 &&
+         points_box.squaredExteriorDistance(local->point(surface_node).x) < local->reach() * local->reach();
+}
+
+Vec3 SurfaceLoad::local_displacement(Index surface_node) const noexcept {
+  Vec3 sum = Vec3::Zero();
+  if (!is_in_local_reach(surface_node)) return sum;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(point_count); ++k)
+    sum += LocalCompliance::displacement(local->point(surface_node), local->point(point[k]), point_force[k]);
+  return sum;
+}
+
+Vec3 SurfaceLoad::far_local_displacement(Index surface_node) const noexcept {
+  Vec3 sum = Vec3::Zero();
+  if (!is_in_local_reach(surface_node)) return sum;
+  for (std::size_t k = 0; k < lump.size(); ++k) {
+    if (!lump_force[k].isZero(0.0))
+      sum += LocalCompliance::displacement(local->point(surface_node), lump[k], lump_force[k]);
+  }
+  return sum;
 }
 
 void SurfaceLoad::add_to_patch(Index place, const double* f) noexcept {

@@ -1,11 +1,13 @@
 // Load that determines the displacement of the whole surface.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "runtime/core/body/greens.h"
+#include "runtime/core/body/local_compliance.h"
 #include "runtime/core/body/patch.h"
 
 namespace palpate {
@@ -15,13 +17,25 @@ class ElasticBody;
 /// Forces of a tick. Assigning one of the same body and capacities allocates nothing.
 struct SurfaceLoad {
   /// Capacities: loaded nodes near the tools, stored nodes that they follow, and nodes g of a patch.
-  SurfaceLoad(int dimension, Index near_nodes, Index stored_nodes, Index patch_nodes);
+  SurfaceLoad(const ElasticBody& body, Index near_nodes, Index stored_nodes, Index patch_nodes);
 
   void clear() noexcept;
   /// Adds a force [N] on a stored node.
   void add(Index stored, const double* force) noexcept;
   /// Adds a force [N] on a surface node of the patch, given by its place there.
   void add_to_patch(Index place, const double* force) noexcept;
+  /// Adds a force [N] on a surface node, for the local compliance alone.
+  void add_point(Index node, const Vec3& force) noexcept;
+  /// Call after the last of these.
+  void lump_points() noexcept;
+  /// Displacement [m] of a surface node by the local compliance, beside that of the stored nodes.
+  [[nodiscard]] Vec3 local_displacement(Index node) const noexcept;
+  /// The same of a node that is not close to the forces, in less time.
+  [[nodiscard]] Vec3 far_local_displacement(Index node) const noexcept;
+  /// The body's local compliance where it holds: not with a patch, nor for a body that has changed.
+  [[nodiscard]] const LocalCompliance* local_now() const noexcept {
+    return patch == nullptr && compliance == nullptr ? local.get() : nullptr;
+  }
   /// True if forces on the surface nodes of a patch fit.
   [[nodiscard]] bool fits(const Patch& other) const noexcept {
     return !other.is_sampled() || other.fine_dofs() <= dimension * Patch::most_nodes;
@@ -36,16 +50,26 @@ struct SurfaceLoad {
     return {force.data(), static_cast<std::size_t>(dimension * count)};
   }
 
-  /// Compliance for the forces: `compliance`, or the body's Green's functions.
+  /// Compliance for the forces: `compliance`, or the body's Green's functions, with a local compliance those
+  /// of its smooth part.
   [[nodiscard]] const Greens& greens(const ElasticBody& body) const noexcept;
+
+  [[nodiscard]] bool is_in_local_reach(Index node) const noexcept;
 
   int dimension;  ///< d
   Index count = 0;
   std::vector<Index> node;
   std::vector<double> force;
-  std::shared_ptr<const Patch> patch;        ///< null if there is no overlay
-  std::shared_ptr<const Greens> compliance;  ///< for a body that has changed; null: the body's
-  Index patch_count = 0;                     ///< number of forces on nodes of the patch's fine mesh
+  std::shared_ptr<const Patch> patch;            ///< null if there is no overlay
+  std::shared_ptr<const Greens> compliance;      ///< for a body that has changed; null: the body's
+  std::shared_ptr<const LocalCompliance> local;  ///< null: none
+  Index point_count = 0;                         ///< number of forces for the local compliance
+  std::vector<Index> point;                      ///< surface nodes
+  std::vector<Vec3> point_force;
+  Eigen::AlignedBox3d points_box;                ///< where these are at rest
+  std::array<LocalCompliance::Point, 8> lump{};  ///< all forces of an eighth of that box together
+  std::array<Vec3, 8> lump_force{};
+  Index patch_count = 0;  ///< number of forces on nodes of the patch's fine mesh
   std::vector<Index> patch_place;
   std::vector<double> patch_force;
   std::vector<Index> first_force;  ///< [most_nodes] place of a node's force in these two; -1: none

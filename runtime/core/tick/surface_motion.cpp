@@ -30,7 +30,7 @@ Vec3 stored_displacement(const ElasticBody& body, const SurfaceState& surface, I
   Vec3 sum = Vec3::Zero();
   for (std::size_t k = 0; k < parts.stored.size(); ++k)
     sum += parts.weights[k] * vector_at(surface.stored_displacement, body.dimension(), parts.stored[k]);
-  return sum;
+  return sum + surface.near.load().far_local_displacement(node);
 }
 
 /// Computes the displacement of ranges of stored nodes by the near field's load.
@@ -179,6 +179,7 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
 }
 
 void renew_stored_displacement(const ElasticBody& body, SurfaceState& surface) noexcept {
+  if (surface.near.load().local_now() != nullptr) return;  // near nodes move by the local compliance too
   for (Index place = 0; place < surface.near.count(); ++place) {
     const auto node = static_cast<std::size_t>(surface.near.node(place));
     if (node >= body.surface_stored_nodes().size()) continue;

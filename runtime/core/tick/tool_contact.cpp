@@ -105,6 +105,15 @@ bool rolls(const LastContacts& remembered, const Tool& tool, const ContactPoint&
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
+/// Friction with which a node is kept from slipping round the side of a tool, which the surface of a body of
+/// small strain does once the tool is deeper than 1.3 of its radius; it would be lost inside. None where the
+/// normal is within 45 degrees of the surface's at rest, which a sphere is up to 0.6 of its radius deep.
+double holding_friction(const LocalCompliance& local, Index node, const Vec3& normal) noexcept {
+  const DetectionTuning& limits = tuning.detection;
+  const double inclination = local.point(node).normal.dot(normal);
+  return std::clamp((limits.slips - inclination) / (limits.slips - limits.holds), 0.0, 1.0);
+}
+
 void add_candidate(const ElasticBody& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[tool_number];
@@ -136,6 +145,8 @@ void add_candidate(const ElasticBody& body, State& state, Scratch& scratch, Inde
   contact.frame = contact_frame(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
+  if (vertex >= 0 && body.local() != nullptr)
+    contact.friction = std::max(contact.friction, holding_friction(*body.local(), vertex, normal));
   contact.rolls = !face_tells && rolls(scratch.last, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));

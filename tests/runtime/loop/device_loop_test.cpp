@@ -279,7 +279,7 @@ TEST(Settings, ReadBackAsTheyWere) {
   settings.tool.coupling_stiffness = 1000.0 / 3.0;
   settings.origin = Vec3(0.1, -1.0 / 3.0, 1e-17);
   settings.axes = "-y,x,z";
-  settings.overlay = OverlayOptions{.refinement = 3, .rings = 1};
+  settings.overlay = {.kind = OverlayKind::uniform, .refinement = 3, .rings = 1};
   settings.safety = SafetyOptions{};
   settings.safety->max_force = 10.0 / 3.0;
   settings.safety->buzz.flips = 7;

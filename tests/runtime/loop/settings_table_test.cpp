@@ -154,11 +154,11 @@ TEST(SettingsTable, HasTheDefaults) {
     }
   }
   EXPECT_EQ(in_words, (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force",
-                                             "reach", "overlay", "origin", "poissons-ratio", "safety",
-                                             "solver", "floor", "room", "obstacle"}));
+                                             "reach", "origin", "poissons-ratio", "safety", "solver", "floor",
+                                             "room", "obstacle"}));
   Settings read = read_settings(defaults), made;
   read.live.solver = made.live.solver = LiveLaw::corotational;  // else the others of it are not told
-  read.overlay = made.overlay = OverlayOptions{};               // else its memory is not told
+  read.overlay = made.overlay = OverlayOptions{.kind = OverlayKind::uniform};  // else its memory is not told
   EXPECT_EQ(to_text(read), to_text(made));
 }
 

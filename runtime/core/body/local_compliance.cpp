@@ -1,0 +1,335 @@
+#include "runtime/core/body/local_compliance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "runtime/core/body/elastic_body.h"
+
+namespace palpate {
+namespace {
+
+using Point = LocalCompliance::Point;
+
+constexpr double edges_of_reach = 4.0;
+// Compliance of a node by its own force, times pi E / (1 - nu^2) and the radius of its disc: what is left of
+// an even load on a lattice once the other nodes are point loads (2.20 for squares, 2.21 for triangles).
+constexpr double of_lattice = 2.2;
+constexpr double same_side = 0.5;  // cosine between normals from which on points count as side by side
+
+std::size_t at(Index i) noexcept {
+  return static_cast<std::size_t>(i);
+}
+
+/// Share of two points' half-space: 1 on one side of the body, 0 round an edge of 90 degrees and beyond.
+double share_of_sides(const Point& a, const Point& b) noexcept {
+  const double t = std::clamp(a.normal.dot(b.normal) / same_side, 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+/// How much of the half-space is left at a distance: 1 at 0, 0 at the reach.
+double left_at(double distance, const Point& a, const Point& b) noexcept {
+  const double q = 2.0 * distance / (a.reach + b.reach);
+  return q < 1.0 ? (1.0 - q * q) * (1.0 - q * q) : 0.0;
+}
+
+/// Displacement of the half-space's surface at `a` by a force at `b` (Johnson, Contact Mechanics, 1985, 3.2
+/// and 3.6) [m/N].
+Mat3 half_space(const Point& a, const Point& b) noexcept {
+  const Vec3 x = a.x - b.x, n = (a.normal + b.normal).normalized();
+  const double r = x.norm(), c = 0.5 * (a.c + b.c) / r, nu = 0.5 * (a.nu + b.nu);
+  const Vec3 q = x / r - n * n.dot(x) / r;
+  const Vec3 turned = 0.5 * (1.0 - 2.0 * nu) * q;
+  Mat3 B = nu * q * q.transpose() + turned * n.transpose() - n * turned.transpose();
+  B.diagonal().array() += 1.0 - nu;
+  return c * B;
+}
+
+/// Displacement of a node by the force on its own part of the surface [m/N].
+Mat3 half_space(const Point& a) noexcept {
+  Mat3 B = -0.5 * a.nu * a.normal * a.normal.transpose();
+  B.diagonal().array() += 1.0 - 0.5 * a.nu;
+  return of_lattice * a.c / a.disc * B;
+}
+
+/// Leaves what acts along free axes.
+Mat3 along_free_axes(const Mat3& B, const Point& a, const Point& b) noexcept {
+  return a.share.asDiagonal() * B * b.share.asDiagonal();
+}
+
+/// Xi - D, with D by blocks between stored nodes.
+class SmoothGreens final : public Greens {
+ public:
+  /// Block of D in the row of a node.
+  struct Block {
+    Index column;
+    Eigen::Matrix3f D;
+  };
+
+  SmoothGreens(std::shared_ptr<const Greens> greens, std::vector<std::vector<Block>> rows)
+      : Greens(greens->dimension(), greens->nodes(), greens->precision()), greens_(std::move(greens)) {
+    first_.push_back(0);
+    for (std::vector<Block>& row : rows) {
+      std::sort(row.begin(), row.end(), [](const Block& a, const Block& b) { return a.column < b.column; });
+      blocks_.insert(blocks_.end(), row.begin(), row.end());
+      first_.push_back(blocks_.size());
+    }
+  }
+
+  [[nodiscard]] const ExactTerms* exact_terms() const noexcept override { return greens_->exact_terms(); }
+  [[nodiscard]] bool unfolded() const noexcept override { return greens_->unfolded(); }
+  [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept override {
+    return greens_->compressed_form();
+  }
+
+  void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
+    greens_->gather(row, columns, blocks);
+    const std::size_t width = 3 * columns.size();
+    const std::span<const Block> of_row = this->of(row);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const auto found = from(of_row, columns[k]);
+      if (found == of_row.end() || found->column != columns[k]) continue;
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < 3; ++j)
+          blocks[i * width + 3 * k + j] -=
+              found->D(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
+    }
+  }
+
+  void displacement(std::span<const Index> nodes, std::span<const double> f,
+                    std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
+    greens_->displacement(nodes, f, ranges, u);
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const Vec3 force(f[3 * k], f[3 * k + 1], f[3 * k + 2]);
+      const std::span<const Block> of_node = of(nodes[k]);
+      double* of_range = u.data();
+      for (const NodeRange& range : ranges) {
+        for (auto block = from(of_node, range.first); block != of_node.end() && block->column < range.end;
+             ++block) {
+          Eigen::Map<Vec3>(of_range + std::ptrdiff_t{3} * (block->column - range.first)) -=
+              block->D.cast<double>().transpose() * force;
+        }
+        of_range += std::ptrdiff_t{3} * (range.end - range.first);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::span<const Block> of(Index node) const noexcept {
+    return std::span(blocks_).subspan(first_[at(node)], first_[at(node) + 1] - first_[at(node)]);
+  }
+  static std::span<const Block>::iterator from(std::span<const Block> row, Index column) noexcept {
+    return std::lower_bound(row.begin(), row.end(), column,
+                            [](const Block& block, Index wanted) { return block.column < wanted; });
+  }
+
+  std::shared_ptr<const Greens> greens_;
+  std::vector<std::size_t> first_;  // [stored + 1]
+  std::vector<Block> blocks_;       // by rows, ascending
+};
+
+/// Calls visit(a, b) for points nearer to each other than the larger reach, each pair once.
+void for_each_pair(const std::vector<Point>& points, std::size_t count, double reach, auto&& visit) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t k = 0; k < count; ++k) box.extend(points[k].x);
+  Eigen::Index axis = 0;
+  box.sizes().maxCoeff(&axis);
+  std::vector<Index> order;
+  for (std::size_t k = 0; k < count; ++k) order.push_back(static_cast<Index>(k));
+  std::sort(order.begin(), order.end(),
+            [&](Index a, Index b) { return points[at(a)].x[axis] < points[at(b)].x[axis]; });
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point& a = points[at(order[i])];
+    for (std::size_t j = i + 1; j < count && points[at(order[j])].x[axis] - a.x[axis] < reach; ++j) {
+      if ((points[at(order[j])].x - a.x).squaredNorm() < reach * reach) visit(order[i], order[j]);
+    }
+  }
+}
+
+/// What D is found from: the nodes of the body's own surface, their neighbours and the smooth part at each.
+class MeshPart {
+ public:
+  MeshPart(const ElasticBody& body, const LocalParts& parts, const std::vector<Point>& points)
+      : body_(body), points_(points), beside_(body.surface_stored_nodes().size()) {
+    for (std::size_t s = 0; s < parts.simplices.size(); s += 3) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index a = parts.simplices[s + k], b = parts.simplices[s + (k + 1) % 3];
+        beside_[at(a)].insert(b);
+        beside_[at(b)].insert(a);
+      }
+    }
+    for (Index node = 0; node < std::ssize(beside_); ++node) smooth_.push_back(smooth_at(node));
+  }
+
+  [[nodiscard]] std::vector<std::vector<SmoothGreens::Block>> blocks(double reach) const {
+    std::vector<std::vector<SmoothGreens::Block>> rows(at(body_.greens().nodes()));
+    for (Index node = 0; node < std::ssize(beside_); ++node) {
+      if (is_free(node)) enter(node, node, xi(node, node) - smooth_[at(node)], rows);
+      for (const Index other : beside_[at(node)]) {
+        if (other < node || !is_free(node) || !is_free(other)) continue;
+        const double side = share_of_sides(points_[at(node)], points_[at(other)]);
+        const Mat3 smooth = 0.5 * (smooth_[at(node)] + smooth_[at(other)]);
+        const double faded = 1.0 - left(node, other);
+        enter(node, other, side * (xi(node, other) - smooth) - faded * near(node, other), rows);
+      }
+    }
+    for_each_pair(points_, beside_.size(), reach, [&](Index a, Index b) {
+      if (!is_free(a) || !is_free(b) || beside_[at(a)].contains(b)) return;
+      const double share = left(a, b);
+      if (share > 0.0) enter(a, b, share * near(a, b), rows);
+    });
+    return rows;
+  }
+
+ private:
+  [[nodiscard]] Index stored(Index node) const noexcept { return body_.surface_stored_nodes()[at(node)]; }
+  [[nodiscard]] bool is_free(Index node) const noexcept {
+    return stored(node) >= 0 && !points_[at(node)].share.isZero(0.0);
+  }
+  [[nodiscard]] Mat3 xi(Index a, Index b) const { return body_.greens().block(stored(a), stored(b)); }
+  [[nodiscard]] double left(Index a, Index b) const noexcept {
+    return left_at((points_[at(a)].x - points_[at(b)].x).norm(), points_[at(a)], points_[at(b)]);
+  }
+  /// The half-space between two nodes, not faded.
+  [[nodiscard]] Mat3 near(Index a, Index b) const noexcept {
+    const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
+    return share_of_sides(of_a, of_b) * along_free_axes(half_space(of_a, of_b), of_a, of_b);
+  }
+
+  /// Mean of Xi - B at the nodes two edges away, where the mesh is right; of those one edge away if there are
+  /// none.
+  [[nodiscard]] Mat3 smooth_at(Index node) const {
+    if (!is_free(node)) return Mat3::Zero();
+    std::set<Index> ring;
+    for (const Index other : beside_[at(node)])
+      ring.insert(beside_[at(other)].begin(), beside_[at(other)].end());
+    for (const Index other : beside_[at(node)]) ring.erase(other);
+    ring.erase(node);
+    if (ring.empty()) ring = beside_[at(node)];
+    Mat3 sum = Mat3::Zero();
+    double weight = 0.0;
+    for (const Index other : ring) {
+      if (!is_free(other)) continue;
+      const double share = share_of_sides(points_[at(node)], points_[at(other)]);
+      if (share == 0.0) continue;
+      sum += share * xi(node, other) - near(node, other);
+      weight += share;
+    }
+    if (weight == 0.0) return xi(node, node);
+    return 0.5 / weight * (sum + sum.transpose());
+  }
+
+  void enter(Index a, Index b, const Mat3& D, std::vector<std::vector<SmoothGreens::Block>>& rows) const {
+    rows[at(stored(a))].push_back({stored(b), D.cast<float>()});
+    if (a != b) rows[at(stored(b))].push_back({stored(a), D.transpose().cast<float>()});
+  }
+
+  const ElasticBody& body_;
+  const std::vector<Point>& points_;
+  std::vector<std::set<Index>> beside_;  // [nodes of the body's surface]
+  std::vector<Mat3> smooth_;             // [as these]
+};
+
+}  // namespace
+
+LocalCompliance::LocalCompliance(const ElasticBody& body, const LocalParts& parts)
+    : points_(body.surface_rest_positions().size()) {
+  measure(body, parts);
+  follow(body, parts);
+  for (const Point& point : points_) reach_ = std::max(reach_, point.reach);
+  smooth_ = std::make_unique<const SmoothGreens>(body.shared_greens(),
+                                                 MeshPart(body, parts, points_).blocks(reach_));
+}
+
+LocalCompliance::~LocalCompliance() = default;
+
+/// Finds positions, normals, material and area of the surface's nodes.
+void LocalCompliance::measure(const ElasticBody& body, const LocalParts& parts) {
+  const std::span<const Index> simplices = body.simplices();
+  std::vector<double> area(points_.size(), 0.0);
+  for (std::size_t k = 0; k < points_.size(); ++k) points_[k].x = body.surface_rest_positions()[k];
+  for (std::size_t s = 0; s < simplices.size(); s += 3) {
+    const Vec3 &a = point(simplices[s]).x, &b = point(simplices[s + 1]).x, &c = point(simplices[s + 2]).x;
+    const Vec3 normal = 0.5 * (b - a).cross(c - a);
+    const double E = parts.youngs_modulus[s / 3], nu = parts.poissons_ratio[s / 3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      Point& point = points_[at(simplices[s + k])];
+      point.normal += normal;
+      point.c += normal.norm() * (1.0 + nu) / (std::numbers::pi * E);
+      point.nu += normal.norm() * nu;
+      area[at(simplices[s + k])] += normal.norm();
+    }
+  }
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    points_[k].normal.normalize();
+    points_[k].c /= area[k];
+    points_[k].nu /= area[k];
+    points_[k].disc = std::sqrt(area[k] / 3.0 / std::numbers::pi);
+  }
+}
+
+/// Finds the reach by the edges of the body's own mesh, and the axes that are free.
+void LocalCompliance::follow(const ElasticBody& body, const LocalParts& parts) {
+  const std::size_t of_body = body.surface_stored_nodes().size();
+  std::vector<double> sum(of_body, 0.0), count(of_body, 0.0);
+  double all = 0.0;
+  for (std::size_t s = 0; s < parts.simplices.size(); s += 3) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = parts.simplices[s + k], b = parts.simplices[s + (k + 1) % 3];
+      const double length = (point(a).x - point(b).x).norm();
+      for (const Index node : {a, b}) {
+        sum[at(node)] += length;
+        count[at(node)] += 1.0;
+      }
+      all += length;
+    }
+  }
+  const double mean = all / static_cast<double>(parts.simplices.size());
+  std::vector<Vec3> free(at(body.greens().nodes()), Vec3::Ones());
+  for (std::size_t node = 0; node < of_body; ++node) {
+    points_[node].reach = edges_of_reach * (count[node] > 0.0 ? sum[node] / count[node] : mean);
+    const Index stored = body.surface_stored_nodes()[node];
+    if (stored < 0) continue;
+    const Eigen::MatrixXd own = body.greens().block(stored, stored);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) free[at(stored)][axis] = own(axis, axis) > 0.0 ? 1.0 : 0.0;
+  }
+  for (std::size_t node = 0; node < points_.size(); ++node) {
+    const SurfaceParts of_node = body.surface_parts(static_cast<Index>(node));
+    double reach = 0.0, weight = 0.0;
+    for (std::size_t k = 0; k < of_node.stored.size(); ++k) {
+      points_[node].share += of_node.weights[k] * free[at(of_node.stored[k])];
+      const double part = std::abs(of_node.weights[k]);
+      reach += part * points_[at(body.surface_node_of_stored(of_node.stored[k]))].reach;
+      weight += part;
+    }
+    if (node >= of_body) points_[node].reach = weight > 0.0 ? reach / weight : edges_of_reach * mean;
+  }
+}
+
+Vec3 LocalCompliance::displacement(const Point& a, const Point& b, const Vec3& force) noexcept {
+  const Vec3 x = a.x - b.x;
+  const double squared = x.squaredNorm(), sum_of_reaches = a.reach + b.reach;
+  if (4.0 * squared >= sum_of_reaches * sum_of_reaches) return Vec3::Zero();
+  const Vec3 f = b.share.cwiseProduct(force);
+  if (squared == 0.0) return a.share.cwiseProduct(half_space(a) * f);
+  const double r = std::sqrt(squared), nu = 0.5 * (a.nu + b.nu);
+  const Vec3 n = (a.normal + b.normal).normalized(), q = (x - n * n.dot(x)) / r;
+  const double along = q.dot(f), turned = 0.5 * (1.0 - 2.0 * nu);
+  const Vec3 u = (1.0 - nu) * f + (nu * along + turned * n.dot(f)) * q - turned * along * n;
+  return left_at(r, a, b) * share_of_sides(a, b) * 0.5 * (a.c + b.c) / r * a.share.cwiseProduct(u);
+}
+
+Mat3 LocalCompliance::between(Index node, Index loaded) const noexcept {
+  const Point &a = points_[at(node)], &b = points_[at(loaded)];
+  if (node == loaded) return along_free_axes(half_space(a), a, a);
+  const double left = left_at((a.x - b.x).norm(), a, b);
+  if (left == 0.0) return Mat3::Zero();
+  return left * share_of_sides(a, b) * along_free_axes(half_space(a, b), a, b);
+}
+
+}  // namespace palpate

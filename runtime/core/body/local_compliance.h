@@ -1,0 +1,71 @@
+// The body's own compliance close to a contact, in place of its mesh's.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/vectors.h"
+#include "runtime/core/body/greens.h"
+
+namespace palpate {
+
+class ElasticBody;
+
+/// What a body in space is made of below its surface, and the surface as it is meshed.
+struct LocalParts {
+  std::vector<Index> simplices{};  ///< [3 x] surface nodes of the body's own triangles; empty: no such term
+  std::vector<double> youngs_modulus{};  ///< [F] below each triangle that tools meet [Pa]
+  std::vector<double> poissons_ratio{};  ///< [F]
+};
+
+/// Compliance between points of the surface whose near part is that of the elastic half-space (Boussinesq
+/// 1885, Cerruti 1882) and not the mesh's, which is stiffer the smaller the contact:
+///
+///   W_ij = N_i (Xi - D) N_j^T + B(x_i - x_j).
+///
+/// B is the half-space's compliance, faded out within four edges. D is what Xi has in its place: the same B
+/// between nodes, and at a node and beside it all but the mean of Xi - B at the ring of nodes around these,
+/// where the mesh is right. So W no longer depends on the mesh, nor on the place within it
+/// (docs/decisions-contact.md). Const once made; any number of threads may use it.
+class LocalCompliance {
+ public:
+  /// For a body in space with isotropic material; `body` is needed until this is made.
+  LocalCompliance(const ElasticBody& body, const LocalParts& parts);
+  ~LocalCompliance();
+  LocalCompliance(const LocalCompliance&) = delete;
+  LocalCompliance& operator=(const LocalCompliance&) = delete;
+
+  /// Xi - D.
+  [[nodiscard]] const Greens& smooth() const noexcept { return *smooth_; }
+  /// B: displacement of a surface node by a force on another, or by one on itself [m/N].
+  [[nodiscard]] Mat3 between(Index node, Index loaded) const noexcept;
+
+  /// A node of the surface at rest.
+  struct Point {
+    Vec3 x = Vec3::Zero(), normal = Vec3::Zero();
+    Vec3 share = Vec3::Zero();  ///< of each axis that is free: 1, on held nodes 0
+    double c = 0.0;             ///< (1 + nu) / (pi E) [1/Pa]
+    double nu = 0.0;
+    double reach = 0.0;  ///< [m] four edges
+    double disc = 0.0;   ///< radius of the disc as large as its part of the surface [m]
+  };
+  [[nodiscard]] const Point& point(Index node) const noexcept {
+    return points_[static_cast<std::size_t>(node)];
+  }
+  /// B f [m] at a point by a force [N] on another.
+  [[nodiscard]] static Vec3 displacement(const Point& a, const Point& loaded, const Vec3& force) noexcept;
+  /// Within this distance B is not zero [m].
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+
+ private:
+  void measure(const ElasticBody& body, const LocalParts& parts);
+  void follow(const ElasticBody& body, const LocalParts& parts);
+
+  std::vector<Point> points_;  // [S]
+  double reach_ = 0.0;
+  std::unique_ptr<const Greens> smooth_;
+};
+
+}  // namespace palpate
