@@ -19,16 +19,15 @@ constexpr double edges_of_reach = 4.0;
 // Compliance of a node by its own force, times pi E / (1 - nu^2) and the radius of its disc: what is left of
 // an even load on a lattice once the other nodes are point loads (2.20 for squares, 2.21 for triangles).
 constexpr double of_lattice = 2.2;
-constexpr double same_side = 0.5;  // cosine between normals from which on points count as side by side
+constexpr double least_share = 1e-9;  // below it two normals have no mean
 
 std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-/// Share of two points' half-space: 1 on one side of the body, 0 round an edge of 90 degrees and beyond.
+/// Share of two points' half-space: 1 on a flat side, less round an edge, 0 on both sides of a plate.
 double share_of_sides(const Point& a, const Point& b) noexcept {
-  const double t = std::clamp(a.normal.dot(b.normal) / same_side, 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
+  return 0.5 * (1.0 + a.normal.dot(b.normal));
 }
 
 /// How much of the half-space is left at a distance: 1 at 0, 0 at the reach.
@@ -198,7 +197,9 @@ class MeshPart {
   /// The half-space between two nodes, not faded.
   [[nodiscard]] Mat3 near(Index a, Index b) const noexcept {
     const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
-    return share_of_sides(of_a, of_b) * along_free_axes(half_space(of_a, of_b), of_a, of_b);
+    const double share = share_of_sides(of_a, of_b);
+    if (share < least_share) return Mat3::Zero();
+    return share * along_free_axes(half_space(of_a, of_b), of_a, of_b);
   }
 
   /// Mean of Xi - B at the nodes two edges away, where the mesh is right; of those one edge away if there are
@@ -216,7 +217,7 @@ class MeshPart {
     for (const Index other : ring) {
       if (!is_free(other)) continue;
       const double share = share_of_sides(points_[at(node)], points_[at(other)]);
-      if (share == 0.0) continue;
+      if (share < least_share) continue;
       sum += share * xi(node, other) - near(node, other);
       weight += share;
     }
@@ -315,21 +316,24 @@ Vec3 LocalCompliance::displacement(const Point& a, const Point& b, const Vec3& f
   const Vec3 x = a.x - b.x;
   const double squared = x.squaredNorm(), sum_of_reaches = a.reach + b.reach;
   if (4.0 * squared >= sum_of_reaches * sum_of_reaches) return Vec3::Zero();
+  const double share = share_of_sides(a, b);
+  if (share < least_share) return Vec3::Zero();
   const Vec3 f = b.share.cwiseProduct(force);
   if (squared == 0.0) return a.share.cwiseProduct(half_space(a) * f);
   const double r = std::sqrt(squared), nu = 0.5 * (a.nu + b.nu);
   const Vec3 n = (a.normal + b.normal).normalized(), q = (x - n * n.dot(x)) / r;
   const double along = q.dot(f), turned = 0.5 * (1.0 - 2.0 * nu);
   const Vec3 u = (1.0 - nu) * f + (nu * along + turned * n.dot(f)) * q - turned * along * n;
-  return left_at(r, a, b) * share_of_sides(a, b) * 0.5 * (a.c + b.c) / r * a.share.cwiseProduct(u);
+  return left_at(r, a, b) * share * 0.5 * (a.c + b.c) / r * a.share.cwiseProduct(u);
 }
 
 Mat3 LocalCompliance::between(Index node, Index loaded) const noexcept {
   const Point &a = points_[at(node)], &b = points_[at(loaded)];
   if (node == loaded) return along_free_axes(half_space(a), a, a);
   const double left = left_at((a.x - b.x).norm(), a, b);
-  if (left == 0.0) return Mat3::Zero();
-  return left * share_of_sides(a, b) * along_free_axes(half_space(a, b), a, b);
+  const double share = share_of_sides(a, b);
+  if (left == 0.0 || share < least_share) return Mat3::Zero();
+  return left * share * along_free_axes(half_space(a, b), a, b);
 }
 
 }  // namespace palpate

@@ -28,7 +28,7 @@ struct LocalParts {
 /// B is the half-space's compliance, faded out within four edges. D is what Xi has in its place: the same B
 /// between nodes, and at a node and beside it all but the mean of Xi - B at the ring of nodes around these,
 /// where the mesh is right. So W no longer depends on the mesh, nor on the place within it
-/// (docs/decisions-contact.md). Const once made; any number of threads may use it.
+/// (docs/theory-contact.md). Const once made; any number of threads may use it.
 class LocalCompliance {
  public:
   /// For a body in space with isotropic material; `body` is needed until this is made.

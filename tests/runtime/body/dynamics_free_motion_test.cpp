@@ -134,7 +134,7 @@ TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
     FreeMotion& motion = loop.state.surface.motion;
     const Greens& greens = loop.body.greens();
     std::vector<double> u(static_cast<std::size_t>(greens.order()));
-    SurfaceLoad none(body_, 0, 8, 0), load(body_, 0, 8, 0), far(body_, 0, 8, 0);
+    SurfaceLoad none(loop.body, 0, 8, 0), load(loop.body, 0, 8, 0), far(loop.body, 0, 8, 0);
     const std::vector<double> f = {1e-3, -2e-3, 0.5e-3}, large = {1.0, 1.0, 1.0};
     load.add(3, f.data());
     far.add(1, large.data());
@@ -161,7 +161,7 @@ TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
     Loop loop(model(), tool_);
     FreeMotion& motion = loop.state.surface.motion;
     std::vector<double> u(static_cast<std::size_t>(loop.body.greens().order()));
-    SurfaceLoad none(body_, 0, 8, 0), far(body_, 0, 8, 0);
+    SurfaceLoad none(loop.body, 0, 8, 0), far(loop.body, 0, 8, 0);
     const std::vector<double> large = {1.0, 1.0, 1.0};
     far.add(1, large.data());
     for (int k = 0; k < 30; ++k) {
@@ -187,7 +187,7 @@ TEST_P(Release, AddsToWhatMoves) {
   const auto n = static_cast<std::size_t>(greens.order());
   const test::SparseRoute sparse(model());
   FreeMotion& motion = loop.state.surface.motion;
-  SurfaceLoad none(body_, 0, 8, 0), first(body_, 0, 8, 0), second(body_, 0, 8, 0);
+  SurfaceLoad none(loop.body, 0, 8, 0), first(loop.body, 0, 8, 0), second(loop.body, 0, 8, 0);
   const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
   first.add(3, f.data());
   second.add(1, f.data());
@@ -248,7 +248,7 @@ TEST_P(Release, MovesTheSurfaceThatTheTickHasAskedFor) {
   Loop loop(model(), tool_);
   const Body& body = loop.body;
   FreeMotion& motion = loop.state.surface.motion;
-  SurfaceLoad none(body_, 0, 8, 0), load(body_, 0, 8, 0);
+  SurfaceLoad none(loop.body, 0, 8, 0), load(loop.body, 0, 8, 0);
   const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
   load.add(3, f.data());
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));

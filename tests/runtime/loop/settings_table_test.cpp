@@ -61,7 +61,7 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(contact, contact2);
   EXPECT_NE(load, load2);
   EXPECT_NE(stiffness, stiffness2);
-  EXPECT_NE(overlay.has_value(), overlay2.has_value());
+  EXPECT_NE(overlay.kind, overlay2.kind);
   EXPECT_NE(law, law2);
   EXPECT_NE(memory, memory2);
   EXPECT_NE(warp, warp2);
