@@ -72,6 +72,7 @@ struct RecordedSurface {
   int corners = 3;                   ///< corners of a simplex d: 3 for triangles, 2 for lines in the plane
   std::vector<Index> simplices;      ///< [T x d]
   std::vector<std::uint8_t> held{};  ///< [S] as Model::fixed; empty if unknown
+  std::vector<Vec3> finer{};         ///< further nodes that tools press on, numbered behind the others [m]
 };
 
 /// Description of a session.

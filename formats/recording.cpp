@@ -108,9 +108,11 @@ void check_surface(const RecordedSurface& surface, const RecordingChecker& check
                surface.simplices.size(), "a multiple of their corners");
   check.expect(std::ssize(surface.held) == nodes, on_surface, 0, "held", surface.held.size(),
                "as many as nodes");
-  for (std::size_t i = 0; i < surface.nodes.size(); ++i)
-    for (const double x : surface.nodes[i])
-      check.expect(std::isfinite(x), on_surface, i, "node", x, "a finite number");
+  for (const auto* of : {&surface.nodes, &surface.finer}) {
+    for (std::size_t i = 0; i < of->size(); ++i)
+      for (const double x : (*of)[i])
+        check.expect(std::isfinite(x), on_surface, i, "node", x, "a finite number");
+  }
   for (std::size_t i = 0; i < surface.simplices.size(); ++i)
     check.expect(surface.simplices[i] >= 0 && surface.simplices[i] < nodes, on_surface, i, "simplices",
                  surface.simplices[i], "a node of the surface");
@@ -367,7 +369,7 @@ ContactLoads RecordingFile::loads(std::int64_t number) const {
   ContactLoads loads;
   const std::string_view message = impl_->message(number);
   impl_->check.expect_whole(from_message(message, loads), "/contacts", static_cast<std::size_t>(number));
-  check_loads(loads, surface().nodes.size(), static_cast<std::size_t>(number), impl_->check);
+  check_loads(loads, surface().nodes.size() + surface().finer.size(), static_cast<std::size_t>(number), impl_->check);
   return loads;
 }
 

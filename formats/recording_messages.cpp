@@ -193,8 +193,9 @@ std::string to_message(const RecordedEvent& event) {
 
 std::string to_message(const RecordedSurface& surface) {
   std::vector<double> nodes;
-  nodes.reserve(3 * surface.nodes.size());
-  for (const Vec3& node : surface.nodes) nodes.insert(nodes.end(), node.begin(), node.end());
+  nodes.reserve(3 * (surface.nodes.size() + surface.finer.size()));
+  for (const auto* of : {&surface.nodes, &surface.finer})
+    for (const Vec3& node : *of) nodes.insert(nodes.end(), node.begin(), node.end());
   std::vector<std::uint8_t> held = surface.held;
   held.resize(surface.nodes.size());
   return message_of(std::int32_t{surface.corners}, nodes, surface.simplices, held);
@@ -232,8 +233,11 @@ bool from_message(std::string_view message, RecordedSurface& surface) {
   const bool whole = is_read(message, corners, nodes, surface.simplices, surface.held);
   surface.corners = corners;
   surface.nodes.clear();
-  for (std::size_t k = 0; k + 3 <= nodes.size(); k += 3)
-    surface.nodes.emplace_back(nodes[k], nodes[k + 1], nodes[k + 2]);
+  surface.finer.clear();
+  for (std::size_t k = 0; k + 3 <= nodes.size(); k += 3) {
+    std::vector<Vec3>& of = surface.nodes.size() < surface.held.size() ? surface.nodes : surface.finer;
+    of.emplace_back(nodes[k], nodes[k + 1], nodes[k + 2]);
+  }
   return whole && nodes.size() % 3 == 0;
 }
 

@@ -98,6 +98,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
                              .in_background = !options_.fast,
                              .contacts_only = contacts_only},
         [this, contacts_only, fast = options_.fast](SurfacePicture picture) {
+          keep_recorded(body_, picture.frame);
           RecordedPicture recorded = contacts_only ? RecordedPicture(std::move(picture.loads))
                                                    : RecordedPicture(std::move(picture.frame));
           if (fast) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -56,14 +58,35 @@ PictureMaker::PictureMaker(const Body& body)
 void PictureMaker::show(const SurfaceLoad& load, const MotionSnapshot* motion,
                         std::span<const NodalForce> forces, std::span<const NodalPress> presses,
                         SurfaceFrame& frame) {
-  surface_displacement(body_, load, stored_, u_, motion);
-  frame.displacement.reserve(3 * u_.size());
-  for (std::size_t node = 0; node < u_.size(); ++node) {
-    u_[node] += rest_[node];
-    for (const double x : u_[node]) frame.displacement.push_back(static_cast<float>(x));
+  const std::shared_ptr<const Patch> part = fine_part(load);
+  std::vector<Index> drawn;
+  if (load.local_now() != nullptr) {
+    drawn.resize(body_.surface_stored_nodes().size());
+    std::iota(drawn.begin(), drawn.end(), 0);
+    if (part != nullptr)
+      drawn.insert(drawn.end(), part->surface_nodes().begin(), part->surface_nodes().end());
+    sort_out(drawn);
   }
-  show_stress(forces, load.patch.get(), frame);
+  surface_displacement(body_, load, stored_, u_, motion,
+                       drawn.empty() ? std::nullopt : std::optional(std::span<const Index>(drawn)));
+  frame.displacement.resize(3 * u_.size());
+  const auto enter = [&](std::size_t node) {
+    u_[node] += rest_[node];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      frame.displacement[3 * node + axis] = static_cast<float>(u_[node][static_cast<Eigen::Index>(axis)]);
+  };
+  for (const Index node : drawn) enter(static_cast<std::size_t>(node));
+  for (std::size_t node = 0; node < u_.size() && drawn.empty(); ++node) enter(node);
+  show_stress(forces, part != nullptr ? part.get() : load.patch.get(), frame);
   show_pressure(presses, frame);
+}
+
+void keep_recorded(const Body& body, SurfaceFrame& frame) {
+  if (body.local() == nullptr) return;
+  const std::size_t own = body.surface_stored_nodes().size();
+  frame.displacement.resize(3 * own);
+  frame.von_mises.resize(own);
+  frame.pressure.resize(own);
 }
 
 std::shared_ptr<const Patch> PictureMaker::fine_part(const SurfaceLoad& load) {
@@ -127,6 +150,7 @@ SurfaceFrame PictureMaker::picture(const ContactLoads& loads) {
   }
   SurfaceFrame frame{.tick = loads.tick, .time = loads.time};
   show(load, nullptr, forces, presses, frame);
+  keep_recorded(body_, frame);
   return frame;
 }
 

@@ -16,6 +16,10 @@ namespace palpate {
 /// without dynamics, warp or the patches of an overlay.
 [[nodiscard]] bool pictures_follow_from_contacts(const Body& body) noexcept;
 
+/// Leaves what a recording has of a picture: the surface of the body's own mesh where tools meet a finer one
+/// (LocalCompliance), else all.
+void keep_recorded(const Body& body, SurfaceFrame& frame);
+
 /// Normal force of a closed contact point on a surface node [N].
 struct NodalPress {
   Index node = -1;
@@ -38,7 +42,8 @@ class PictureMaker {
   /// `body` must outlive this.
   explicit PictureMaker(const Body& body);
 
-  /// Computes a frame from the forces of a tick, except its time; `motion`: see surface_displacement.
+  /// Computes a frame from the forces of a tick, except its time; `motion`: see surface_displacement. With a
+  /// local compliance of the surface's nodes only those of the body's own mesh and of `fine_part` are right.
   void show(const SurfaceLoad& load, const MotionSnapshot* motion, std::span<const NodalForce> forces,
             std::span<const NodalPress> presses, SurfaceFrame& frame);
   /// [n] displacement of the stored nodes in the last picture [m].

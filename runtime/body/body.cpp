@@ -9,6 +9,7 @@
 #include "matrices/hierarchical.h"
 #include "meshes/surface.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/core/body/local_compliance.h"
 #include "runtime/core/body/modal_newmark.h"
 
 namespace palpate {
@@ -152,7 +153,7 @@ void follow_body(const FineSurface& fine, const Model& model, const std::vector<
   }
 }
 
-/// What the local compliance is found from.
+/// The material below each part of the surface, and the surface as it is meshed.
 LocalParts local_parts(const Model& model, const FineSurface& fine) {
   LocalParts local{.simplices = number_surface(model.surface, model.mesh.nodes.size()).simplices};
   for (const Index element : fine.element) {
@@ -171,6 +172,7 @@ struct Body::Made {
   std::vector<Index> stored_of_mesh;
   FineSurface fine;
   std::shared_ptr<const Rounding> rounding;
+  LocalParts local;  // empty: contact meets the mesh's compliance
 };
 
 Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
@@ -198,10 +200,10 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   parts.simplices = fine.simplices;
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
-  if (local && model.dimension() == 3 && contact == ContactModel::quasi_static)
-    parts.local = local_parts(model, fine);
-  return {std::move(parts), std::move(model), std::move(stored_of_mesh), std::move(fine),
-          std::move(rounding)};
+  const bool is_local = local && model.dimension() == 3 && contact == ContactModel::quasi_static;
+  LocalParts of_local = is_local ? local_parts(model, fine) : LocalParts{};
+  return {std::move(parts), std::move(model),    std::move(stored_of_mesh),
+          std::move(fine),  std::move(rounding), std::move(of_local)};
 }
 
 Body::Body(Made made)
@@ -209,7 +211,9 @@ Body::Body(Made made)
       model_(std::move(made.model)),
       stored_of_mesh_(std::move(made.stored_of_mesh)),
       fine_(std::move(made.fine)),
-      rounding_(std::move(made.rounding)) {}
+      rounding_(std::move(made.rounding)) {
+  if (!made.local.simplices.empty()) take_local(std::make_shared<const LocalCompliance>(*this, made.local));
+}
 
 Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool local)
     : Body(make(std::move(model), options, refinement, contact, local)) {}

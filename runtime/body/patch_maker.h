@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// What makes the body finer under the tools.
+/// Means by which a body is finer under the tools than its mesh.
 enum class OverlayKind : std::uint8_t {
   none,    ///< nothing
   local,   ///< no mesh: LocalCompliance, on a rounded surface, if the body's mesh is too coarse for the tools

@@ -43,7 +43,6 @@ ElasticBody::ElasticBody(BodyParts parts)
   aggregates_ = SurfaceAggregates(dimension(), simplices(), moves);
   runs_ = NodeRuns(tuning.far.run, greens_->nodes(), dimension(), simplices(), follows);
   measure_surface();
-  if (!parts.local.simplices.empty()) local_ = std::make_shared<const LocalCompliance>(*this, parts.local);
 }
 
 void ElasticBody::find_free_nodes(const std::vector<Index>& free) {

@@ -12,10 +12,11 @@
 #include "matrices/newmark.h"
 #include "runtime/core/body/aggregates.h"
 #include "runtime/core/body/greens.h"
-#include "runtime/core/body/local_compliance.h"
 #include "runtime/core/body/node_runs.h"
 
 namespace palpate {
+
+class LocalCompliance;
 
 /// Response of the body to contact forces.
 enum class ContactModel : std::uint8_t {
@@ -62,7 +63,6 @@ struct BodyParts {
   std::vector<Index> first_part = {0};  ///< [S + 1] of each surface node in the next two
   std::vector<Index> part_stored{};     ///< stored nodes that it follows, ascending
   std::vector<double> part_weight{};    ///< SurfaceParts::weights
-  LocalParts local{};                   ///< empty: contact meets the mesh's compliance
 };
 
 /// The constant side of a tick: the body's Green's functions as the tick wants them, its surface, and
@@ -153,6 +153,9 @@ class ElasticBody {
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
   /// [F] mean edge length of each simplex at rest [m].
   [[nodiscard]] std::span<const double> simplex_edges() const noexcept { return simplex_edges_; }
+
+ protected:
+  void take_local(std::shared_ptr<const LocalCompliance> local) { local_ = std::move(local); }
 
  private:
   void find_free_nodes(const std::vector<Index>& free);

@@ -96,7 +96,8 @@ Vec3 displacement(const ElasticBody& body, const MotionSnapshot& shown, Index st
 }
 
 void surface_displacement(const ElasticBody& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u, const MotionSnapshot* motion) noexcept {
+                          std::span<Vec3> u, const MotionSnapshot* motion,
+                          std::optional<std::span<const Index>> only) noexcept {
   const bool moves = motion != nullptr && motion->moves;
   const auto follow_body = [&](Index node, const auto& of_stored) {
     const SurfaceParts parts = body.surface_parts(node);
@@ -107,10 +108,15 @@ void surface_displacement(const ElasticBody& body, const SurfaceLoad& load, std:
   };
   load.greens(body).displacement(load.nodes(), load.forces(), stored);
   if (moves) add_motion(body, *motion, stored);
-  for (std::size_t node = 0; node < u.size(); ++node) {
-    u[node] =
-        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); }) +
-        load.local_displacement(static_cast<Index>(node));
+  const auto find = [&](Index node) {
+    u[static_cast<std::size_t>(node)] =
+        follow_body(node, [&](Index k) { return vector_at(stored, load.dimension, k); }) +
+        load.local_displacement(node);
+  };
+  if (only) {
+    std::for_each(only->begin(), only->end(), find);
+  } else {
+    for (Index node = 0; node < std::ssize(u); ++node) find(node);
   }
   if (load.patch == nullptr) return;
   const std::span<const Index> nodes = load.patch->surface_nodes();

@@ -59,10 +59,12 @@ struct MotionSnapshot {
 /// Displacement of a stored node [m].
 Vec3 displacement(const ElasticBody& body, const MotionSnapshot& shown, Index stored) noexcept;
 
-/// Computes the displacement [S x 3] of all surface nodes [m] by the load, plus the free motion if given.
-/// `stored` [n] is workspace for the displacement of the stored nodes. For display: too slow for a tick.
+/// Computes the displacement [m] of the first u.size() surface nodes, or of as many as `only` has of these,
+/// by the load, plus the free motion if given. `stored` [n] is workspace for the displacement of the stored
+/// nodes. For display: too slow for a tick.
 void surface_displacement(const ElasticBody& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u, const MotionSnapshot* motion = nullptr) noexcept;
+                          std::span<Vec3> u, const MotionSnapshot* motion = nullptr,
+                          std::optional<std::span<const Index>> only = {}) noexcept;
 
 /// Free motion of the body: vibration after a release and, with dynamic contact, the effect of inertia and
 /// viscosity for the forces so far (theory.md section 5). The tick's contact forces displace the body from

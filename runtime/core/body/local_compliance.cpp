@@ -30,7 +30,7 @@ double share_of_sides(const Point& a, const Point& b) noexcept {
   return 0.5 * (1.0 + a.normal.dot(b.normal));
 }
 
-/// How much of the half-space is left at a distance: 1 at 0, 0 at the reach.
+/// Share of the half-space that is left at a distance: 1 at 0, 0 at the reach.
 double left_at(double distance, const Point& a, const Point& b) noexcept {
   const double q = 2.0 * distance / (a.reach + b.reach);
   return q < 1.0 ? (1.0 - q * q) * (1.0 - q * q) : 0.0;
@@ -150,7 +150,7 @@ void for_each_pair(const std::vector<Point>& points, std::size_t count, double r
   }
 }
 
-/// What D is found from: the nodes of the body's own surface, their neighbours and the smooth part at each.
+/// D from the nodes of the body's own surface, their neighbours and the smooth part at each.
 class MeshPart {
  public:
   MeshPart(const ElasticBody& body, const LocalParts& parts, const std::vector<Point>& points)

@@ -13,7 +13,7 @@ namespace palpate {
 
 class ElasticBody;
 
-/// What a body in space is made of below its surface, and the surface as it is meshed.
+/// Material of a body in space below its surface, and the surface as it is meshed.
 struct LocalParts {
   std::vector<Index> simplices{};  ///< [3 x] surface nodes of the body's own triangles; empty: no such term
   std::vector<double> youngs_modulus{};  ///< [F] below each triangle that tools meet [Pa]

@@ -30,7 +30,7 @@ struct SurfaceLoad {
   void lump_points() noexcept;
   /// Displacement [m] of a surface node by the local compliance, beside that of the stored nodes.
   [[nodiscard]] Vec3 local_displacement(Index node) const noexcept;
-  /// The same of a node that is not close to the forces, in less time.
+  /// Displacement [m] by the local compliance of a node that is not close to the forces: in less time.
   [[nodiscard]] Vec3 far_local_displacement(Index node) const noexcept;
   /// The body's local compliance where it holds: not with a patch, nor for a body that has changed.
   [[nodiscard]] const LocalCompliance* local_now() const noexcept {
@@ -66,7 +66,7 @@ struct SurfaceLoad {
   Index point_count = 0;                         ///< number of forces for the local compliance
   std::vector<Index> point;                      ///< surface nodes
   std::vector<Vec3> point_force;
-  Eigen::AlignedBox3d points_box;                ///< where these are at rest
+  Eigen::AlignedBox3d points_box;                ///< box round these at rest
   std::array<LocalCompliance::Point, 8> lump{};  ///< all forces of an eighth of that box together
   std::array<Vec3, 8> lump_force{};
   Index patch_count = 0;  ///< number of forces on nodes of the patch's fine mesh

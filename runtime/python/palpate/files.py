@@ -269,7 +269,10 @@ class Recording:
 
     @property
     def surface(self) -> dict[str, NDArray[Any]]:
-        """`nodes` [S, 3] without loads [m], `simplices` [F, d], `held` [S]: bit 0, 1, 2 where held along x, y, z."""
+        """`nodes` [N, 3] without loads [m], `simplices` [F, d], `held` [S]: bit 0, 1, 2 where held along x, y, z.
+
+        The first S nodes are those of the pictures; on the others tools press too, where that is finer than the mesh.
+        """
         told = self.messages("/surface")
         if not len(told):
             raise Error(f"{self._file.path} has no surface", "record again without --record-frames 0")
