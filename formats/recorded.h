@@ -73,6 +73,8 @@ struct RecordedSurface {
   std::vector<Index> simplices;      ///< [T x d]
   std::vector<std::uint8_t> held{};  ///< [S] as Model::fixed; empty if unknown
   std::vector<Vec3> finer{};         ///< further nodes that tools press on, numbered behind the others [m]
+
+  [[nodiscard]] std::size_t pressed_nodes() const noexcept { return nodes.size() + finer.size(); }
 };
 
 /// Description of a session.

@@ -249,7 +249,7 @@ struct RecordingFile::Impl {
       ContactLoads loads;
       const std::size_t row = pictures.size();
       check.expect_whole(from_message(message.data, loads) && surface && !stores_pictures, "/contacts", row);
-      check_loads(loads, surface->nodes.size(), row, check);
+      check_loads(loads, surface->pressed_nodes(), row, check);
       note({loads.tick, loads.time}, {chunk, message.offset}, "/contacts");
     } else if (kind == RecordedChannel::surface) {
       check.expect_whole(!surface && from_message(message.data, surface.emplace()), on_surface, 0);
@@ -369,7 +369,7 @@ ContactLoads RecordingFile::loads(std::int64_t number) const {
   ContactLoads loads;
   const std::string_view message = impl_->message(number);
   impl_->check.expect_whole(from_message(message, loads), "/contacts", static_cast<std::size_t>(number));
-  check_loads(loads, surface().nodes.size() + surface().finer.size(), static_cast<std::size_t>(number), impl_->check);
+  check_loads(loads, surface().pressed_nodes(), static_cast<std::size_t>(number), impl_->check);
   return loads;
 }
 

@@ -336,14 +336,15 @@ int run(int argc, char** argv) {
     if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
-    return probe(
-        {.file = arguments.file,
-         .model_toml = arguments.model_toml,
-         .places = read_places(*probe_command, arguments),
-         .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
-         .json = arguments.json,
-         .field = arguments.field,
-         .force = arguments.force});
+    return probe({.file = arguments.file,
+                  .model_toml = arguments.model_toml,
+                  .places = read_places(*probe_command, arguments),
+                  .overlay = arguments.overlay && *arguments.overlay != "no"
+                                 ? std::optional(read_overlay(*arguments.overlay))
+                                 : std::nullopt,
+                  .json = arguments.json,
+                  .field = arguments.field,
+                  .force = arguments.force});
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();

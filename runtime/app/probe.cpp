@@ -137,7 +137,7 @@ std::vector<std::string> warnings_of(const Body& body, const std::vector<Answer>
 /// Returns a finer mesh over the elements around all requested nodes.
 Overlay make_overlay(const Body& body, const std::vector<Answer>& answers, const OverlayOptions& options) {
   if (options.kind != OverlayKind::uniform)
-    throw Error("'auto' goes by a tool's radius, and displaced nodes have none", "--overlay",
+    throw Error("auto and graded go by a tool's radius, and displaced nodes have none", "--overlay",
                 "write for instance r=3,rings=2");
   const Model& model = body.model();
   const ElementsAtNodes at(model.mesh);

@@ -177,7 +177,16 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
 
 /// Loads another body if the settings need one; the old one, which is large, is freed first.
 void ViewedPlay::load(const Settings& settings) {
-  if (body_ != nullptr && body_options_ == settings.body()) return;
+  const BodyOptions wanted = settings.body();
+  if (body_ != nullptr) {
+    BodyOptions before = body_options_;
+    before.radius = wanted.radius;
+    if (before == wanted &&
+        met_surface(body_->model(), wanted) == met_surface(body_->model(), body_options_)) {
+      body_options_ = wanted;
+      return;
+    }
+  }
   expect_file(options_.file);
   begin_making("the model is being loaded");
   body_.reset();

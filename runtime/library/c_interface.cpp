@@ -131,6 +131,7 @@ palpate_overlay read_overlay(const palpate_overlay* given) {
   if (given == nullptr) return {.size = sizeof(palpate_overlay), .refinement = 1, .rings = 0, .memory = 0};
   const palpate_overlay overlay =
       read_or_throw(given, 0, default_overlay, "the overlay", "PALPATE_OVERLAY_INIT");
+  if (overlay.refinement == PALPATE_OVERLAY_LOCAL) return overlay;
   if (overlay.refinement < least_refinement || overlay.refinement > most_refinement || overlay.rings < 1 ||
       overlay.rings > most_rings) {
     throw Error("an overlay of " + std::to_string(overlay.rings) + " rings, refined " +
@@ -168,7 +169,9 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
   settings.overlay = overlay.refinement > 1 ? OverlayOptions{.kind = OverlayKind::uniform,
                                                              .refinement = overlay.refinement,
                                                              .rings = overlay.rings}
-                                            : OverlayOptions{.kind = OverlayKind::none};
+                     : overlay.refinement == PALPATE_OVERLAY_LOCAL
+                         ? OverlayOptions{}
+                         : OverlayOptions{.kind = OverlayKind::none};
   settings.overlay_memory = overlay.memory;
   settings.rate = whole_rate(options.tick);
   return settings;

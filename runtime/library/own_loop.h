@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -14,6 +15,7 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
+#include "runtime/body/met_surface.h"
 #include "runtime/core/tick/state.h"
 #include "runtime/library/guarded.h"
 #include "runtime/library/palpate.h"
@@ -43,6 +45,18 @@ inline StateOptions with_room(StateOptions options, const Body& body, const palp
   return options;
 }
 
+/// The body that tools meet; overlays of refinement 0 are a LocalCompliance for the smallest of them.
+inline Body make_body(Model model, const StateOptions& options, const palpate_overlay& overlay,
+                      ContactModel contact) {
+  if (overlay.refinement > 0) return Body(std::move(model), {}, overlay.refinement, contact);
+  double radius = std::numeric_limits<double>::infinity();
+  for (const Tool& tool : options.tools)
+    radius = std::min(radius, tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius);
+  const bool is_static = contact == ContactModel::quasi_static && model.dimension() == 3;
+  const MetSurface met = is_static && radius > 0.0 ? met_surface(model, radius) : MetSurface{};
+  return Body(std::move(model), {}, met.refinement, contact, met.is_local);
+}
+
 /// A session.
 struct OwnLoop {
   OwnLoop(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
@@ -50,7 +64,7 @@ struct OwnLoop {
       : file(std::move(name)),
         state_options(options),
         overlay_options(overlay),
-        body(std::move(model), {}, overlay.refinement, contact),
+        body(make_body(std::move(model), options, overlay, contact)),
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),

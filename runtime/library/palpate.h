@@ -105,10 +105,15 @@ palpate_session* palpate_create(const char* file, const palpate_tool* tools, int
  * most four tools have overlays. */
 typedef struct palpate_overlay {
   size_t size;    /* sizeof(palpate_overlay) */
-  int refinement; /* 2 to 16; start with 3 */
+  int refinement; /* 2 to 16; start with 3. Or PALPATE_OVERLAY_LOCAL */
   int rings;      /* 1 to 16; 2 is markedly better than 1 */
   size_t memory;  /* [bytes] limit for all overlays; 512 MB is ample */
 } palpate_overlay;
+
+/* In the place of a refinement: no finer mesh, but close to the tools the body's own compliance in place of
+ * its mesh's, as palpate-runtime play has by default (docs/overlays.md); the surface is refined for the
+ * smallest tool. Needs no layers. Of no effect where that is not possible. */
+#define PALPATE_OVERLAY_LOCAL 0
 
 /* Default overlay: refinement 3, 2 rings, 512 MB. */
 #define PALPATE_OVERLAY_INIT \

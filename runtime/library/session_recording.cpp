@@ -33,6 +33,7 @@ SessionRecording::SessionRecording(const Body& body, const State& state, const O
                   SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(rate_, options.pictures),
                                        .contacts_only = contacts_only},
                   [this, contacts_only](SurfacePicture picture) {
+                    keep_recorded(body_, picture.frame);
                     recorder_.push_picture(contacts_only ? RecordedPicture(std::move(picture.loads))
                                                          : RecordedPicture(std::move(picture.frame)));
                   });

@@ -49,28 +49,6 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
-/// Mean edge of the surface [m]; of tet10 half of an element's.
-double surface_edge(const Model& model) {
-  const auto d = static_cast<std::size_t>(model.dimension());
-  double sum = 0.0;
-  for (std::size_t s = 0; s < model.surface.size(); s += d)
-    sum += (model.mesh.nodes[model.surface[s]] - model.mesh.nodes[model.surface[s + 1]]).norm();
-  return sum / static_cast<double>(model.surface.size() / d);
-}
-
-/// Refinement of the surface for a tool of this radius; 1 if the mesh is fine enough for it.
-int refinement_for(const Model& model, double radius) {
-  constexpr double spacing = 0.15;     // [radius] between the nodes that the tool meets
-  constexpr double fine_enough = 0.2;  // [radius] edges
-  constexpr double most_nodes = 4e5;   // some 150 bytes each, and a second of loading
-  const double edge = surface_edge(model);
-  if (edge <= fine_enough * radius) return 1;
-  const auto most = static_cast<int>(std::sqrt(most_nodes / (0.5 * static_cast<double>(model.surface.size()) /
-                                                             static_cast<double>(model.dimension()))));
-  return std::min({std::max(static_cast<int>(std::ceil(edge / (spacing * radius))), least_refinement),
-                   std::max(most, 1), most_refinement});
-}
-
 /// Refuses settings that a warped body does not support.
 void check_warp(const BodyOptions& options) {
   const auto refuse = [](const char* why, const char* option) {
@@ -104,6 +82,11 @@ void prepare_for_law(Model& model, const BodyOptions& options) {
 }
 
 }  // namespace
+
+MetSurface met_surface(const Model& model, const BodyOptions& options) {
+  const bool by_radius = options.radius > 0.0 && (options.graded || model.dimension() == 3);
+  return by_radius ? met_surface(model, options.radius) : MetSurface{.refinement = options.refinement};
+}
 
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
                const BodyOptions& options) {
@@ -140,11 +123,8 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   if (options.warp) {
     return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   }
-  const bool by_radius = options.radius > 0.0 &&
-                         traits(model.mesh.element).corners == model.dimension() + 1 &&
-                         (options.graded || model.dimension() == 3);
-  const int refinement = by_radius ? refinement_for(model, options.radius) : options.refinement;
-  return Body(std::move(model), {}, refinement, options.contact, by_radius && refinement > 1);
+  const MetSurface met = met_surface(model, options);
+  return Body(std::move(model), {}, met.refinement, options.contact, met.is_local);
 }
 
 void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {

@@ -7,6 +7,7 @@
 #include "formats/outputs/output_paths.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
+#include "runtime/body/met_surface.h"
 #include "runtime/live/live_settings.h"
 
 namespace palpate {
@@ -27,6 +28,9 @@ struct BodyOptions {
   [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || graded; }
   bool operator==(const BodyOptions&) const = default;
 };
+
+/// The surface that tools meet of a body with these options.
+[[nodiscard]] MetSurface met_surface(const Model& model, const BodyOptions& options);
 
 /// Loads `file` and prints a warning for each source that has changed since. If `model_toml` is not empty,
 /// the file must have been made from exactly that description. Throws Error.

@@ -1,11 +1,15 @@
-"""play --overlay auto: the force of a small tool on a coarse ball, against Hertz's contact, and its replay."""
+"""play --overlay auto, the default, and graded: the force of a small tool on a coarse ball, against Hertz's contact, and replays."""
 
 import csv
 import json
 import math
 import unittest
 
-from programs import RUNTIME, ProgramTest, done, run
+import h5py
+import numpy
+from programs import RUNTIME, ProgramTest, done, palpate, run
+from runtime_test import read_grid
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
 
 def ball(levels, radius):
@@ -54,55 +58,100 @@ class Ball(ProgramTest):
         points, faces = ball(2, self.RADIUS)
         self.write("ball.off", f"OFF\n{len(points)} {len(faces)} 0\n" + "".join(f"{x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in points)
                    + "".join(f"3 {a} {b} {c}\n" for a, b, c in faces))
-        self.file = self.bake(
-            'name = "model"\n[geometry]\nsurface = "ball.off"\n[mesh]\nelement = "tet10"\n[material]\nyoungs_modulus = 5e3\n'
-            'poissons_ratio = 0.45\n[[fixed]]\nlowest = {axis = "z", percent = 40}\n[storage]\nscope = "layers"\nlayers = 1\n')
+        self.files = {element: self.bake(
+            f'name = "{element}"\n[geometry]\nsurface = "ball.off"\n[mesh]\nelement = "{element}"\n[material]\nyoungs_modulus = 5e3\n'
+            'poissons_ratio = 0.45\n[[fixed]]\nlowest = {axis = "z", percent = 40}\n[storage]\nscope = "layers"\nlayers = 1\n',
+            name=f"{element}.toml") for element in ("tet4", "tet10")}
         reach = self.RADIUS + self.TOOL - self.DEPTH
         places = [(0.3 + 0.02 * k, math.radians(20.0 * k / 60.0)) for k in range(61)]
         self.script = self.write("way.csv", f"t,x,y,z\n0,0,0,{reach + 0.004}\n" + "".join(
             f"{t:.3f},{reach * math.sin(angle):.9f},0,{reach * math.cos(angle):.9f}\n" for t, angle in places))
-
-    def slide(self, *options):
-        recording = self.folder / "slide.mcap"
-        done(RUNTIME, "play", self.file, "--device", f"script:{self.script}", "--tool", f"sphere:{self.TOOL}", "--friction", "0",
-                     "--fast", "--record", recording, "--record-frames", "0", "--report", self.folder / "report.json", "--force", *options)
-        done(RUNTIME, "export", recording, "--csv", self.folder / "slide.csv", "--force")
-        with open(self.folder / "slide.csv", newline="") as table:
-            rows = [row for row in csv.DictReader(table) if float(row["time"]) > 0.5]
-        return recording, [math.hypot(*(float(row["force_" + axis]) for axis in "xyz")) for row in rows]
-
-    def test_the_force_is_the_bodys(self):
         stiffness = 5e3 / (1.0 - 0.45**2)
-        hertz = 4.0 / 3.0 * stiffness * math.sqrt(1.0 / (1.0 / self.TOOL + 1.0 / self.RADIUS)) * self.DEPTH**1.5
-        mean = {}
-        for option in ((), ("--overlay", "auto")):
-            recording, force = self.slide(*option)
-            mean[option] = sum(force) / len(force)
-            ripple = math.sqrt(sum((f - mean[option])**2 for f in force) / len(force)) / mean[option]
-            if option:
-                self.assertLess(abs(mean[option] / hertz - 1.0), 0.08)  # the whole ball gives way too
-                self.assertLess(ripple, 0.03)
-                report = json.loads((self.folder / "report.json").read_text())
-                self.assertTrue(report["overlay"]["auto"])
-                self.assertGreater(report["overlay"]["switches"], 3)
-                self.assertEqual(report["overlay"]["failed"], 0)
-                done(RUNTIME, "play", self.file, "--device", f"replay:{recording}", "--fast")  # fails unless the same
-            else:
-                self.assertGreater(mean[option] / hertz, 1.3)  # that of the mesh
+        self.hertz = 4.0 / 3.0 * stiffness * math.sqrt(1.0 / (1.0 / self.TOOL + 1.0 / self.RADIUS)) * self.DEPTH**1.5
+
+    def play(self, element, script, *options):
+        """The recording, and the size of the force by ticks."""
+        recording = self.folder / "run.mcap"
+        done(RUNTIME, "play", self.files[element], "--device", f"script:{script}", "--tool", f"sphere:{self.TOOL}", "--friction", "0",
+                     "--fast", "--record", recording, "--report", self.folder / "report.json", "--force", *options)
+        done(RUNTIME, "export", recording, "--csv", self.folder / "run.csv", "--force")
+        with open(self.folder / "run.csv", newline="") as table:
+            return recording, [(float(row["time"]), math.hypot(*(float(row["force_" + axis]) for axis in "xyz"))) for row in csv.DictReader(table)]
+
+    def slide(self, element, *options):
+        """The mean force of the slide over Hertz's, its ripple and largest change in a tick over the mean, and the report."""
+        recording, force = self.play(element, self.script, *options)
+        force = [f for t, f in force if t > 0.5]
+        mean = sum(force) / len(force)
+        ripple = math.sqrt(sum((f - mean)**2 for f in force) / len(force)) / mean
+        done(RUNTIME, "play", self.files[element], "--device", f"replay:{recording}", "--fast")  # fails unless the same
+        return mean / self.hertz, ripple, max(abs(b - a) for a, b in zip(force, force[1:])) / mean, json.loads((self.folder / "report.json").read_text())
+
+    def test_the_force_is_the_bodys_whatever_the_mesh(self):
+        for element, of_mesh in (("tet4", 2.5), ("tet10", 1.3)):
+            mean, ripple, change, report = self.slide(element)
+            self.assertLess(abs(mean / 0.98 - 1.0), 0.03)  # the whole ball gives way too
+            self.assertLess(ripple, 0.01)
+            self.assertLess(change, 0.003)
+            self.assertNotIn("overlay", report)
+            self.assertGreater(self.slide(element, "--overlay", "no")[0], of_mesh)
+
+    def test_an_own_loop_feels_the_same(self):
+        path = [(0.0, 0.0, 0.062 - 0.0001 * k) for k in range(50)]
+        script = self.write("loop.csv", "t,x,y,z\n" + "".join(f"{0.001 * k:.3f},{x},{y},{z:.6f}\n" for k, (x, y, z) in enumerate(path)))
+        recording, _ = self.play("tet4", script)
+        played = palpate.read(recording)
+        with palpate.Session(self.files["tet4"], palpate.Tool(radius=self.TOOL, friction=0, reach=1.0), max_contacts=256,
+                             overlay=palpate.Overlay(refinement=0)) as session:
+            felt = numpy.array([session.step(place).force for place in path])
+        numpy.testing.assert_allclose(-felt[-1], played["force"][len(path) - 1], rtol=1e-6, atol=1e-9)
+        self.assertGreater(felt[-1][2], 0.01)
+
+    def test_a_graded_mesh_has_the_same(self):
+        mean, ripple, _, report = self.slide("tet10", "--overlay", "graded")
+        self.assertLess(abs(mean / 0.98 - 1.0), 0.05)
+        self.assertLess(ripple, 0.03)
+        self.assertTrue(report["overlay"]["graded"])
+        self.assertGreater(report["overlay"]["switches"], 3)
+        self.assertEqual(report["overlay"]["failed"], 0)
+
+    def test_it_is_not_lost_however_deep(self):
+        script = self.write("deep.csv", "t,x,y,z\n0,0,0,0.061\n1.6,0,0,0.0405\n1.8,0,0,0.0405\n")  # 20 mm
+        force = [f for t, f in self.play("tet4", script)[1] if t > 0.2]
+        self.assertGreater(min(force), 0)
+        self.assertGreater(force[-1], 5 * self.hertz)
+
+    def test_pictures_show_the_dent(self):
+        recording, _ = self.play("tet4", self.script)
+        done(RUNTIME, "play", self.files["tet4"], "--device", f"script:{self.script}", "--tool", f"sphere:{self.TOOL}", "--friction", "0", "--fast",
+                     "--surface", "last.vtu")
+        done(RUNTIME, "export", recording, "--hdf5", self.folder / "run.h5")
+        with h5py.File(self.folder / "run.h5") as file:
+            nodes, moved = file["/surface/nodes"][...], file["/frames/displacement"][-1]
+        grid = read_grid(self.folder / "last.vtu")
+        fine, of_fine = vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
+        self.assertGreater(len(fine), 20 * len(nodes))
+        deepest = numpy.linalg.norm(of_fine, axis=1).max()
+        self.assertLess(abs(deepest / self.DEPTH - 1.0), 0.1)
+        places = numpy.linalg.norm(fine[None, :, :] - nodes[:, None, :], axis=2).argmin(axis=1)
+        numpy.testing.assert_allclose(fine[places], nodes, atol=1e-9)
+        numpy.testing.assert_allclose(of_fine[places], moved, atol=0.03 * deepest)  # pictures are of the tick before
 
     def test_a_large_tool_needs_none(self):
-        done(RUNTIME, "play", self.file, "--device", f"script:{self.script}", "--tool", "sphere:0.06", "--fast", "--overlay", "auto",
+        done(RUNTIME, "play", self.files["tet10"], "--device", f"script:{self.script}", "--tool", "sphere:0.06", "--fast", "--overlay", "graded",
                      "--report", self.folder / "report.json")
         self.assertNotIn("overlay", json.loads((self.folder / "report.json").read_text()))
 
     def test_what_it_cannot_go_with_is_refused(self):
         for options, word in ((("--overlay-law", "neo-hookean"), "linear"), (("--warp", "yes"), "--warp"), (("--solver", "corotational"), "--solver")):
-            result = run(RUNTIME, "play", self.file, "--device", f"script:{self.script}", "--fast", "--tool", "sphere:0.01", "--overlay", "auto", *options)
+            result = run(RUNTIME, "play", self.files["tet10"], "--device", f"script:{self.script}", "--fast", "--tool", "sphere:0.01", "--overlay", "graded",
+                         *options)
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn(word, result.stderr)
-        result = run(RUNTIME, "probe", self.file, "--at", "0,0,0.05", "--displace", "0,0,-0.001", "--overlay", "auto")
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("radius", result.stderr)
+        for name in ("auto", "graded"):
+            result = run(RUNTIME, "probe", self.files["tet10"], "--at", "0,0,0.05", "--displace", "0,0,-0.001", "--overlay", name)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("radius", result.stderr)
 
 
 if __name__ == "__main__":

@@ -134,7 +134,7 @@ class IgtlTest(ProgramTest):
     def playing(self, *arguments, script=PRESS):
         """The run, the program that watches it, and a maker of clients, which end with it."""
         self.write("touch.csv", script)
-        play = self.start(RUNTIME, "play", CUBE, "--tool", "sphere:0.1", "--view", "--view-address", "0", *arguments)
+        play = self.start(RUNTIME, "play", CUBE, "--tool", "sphere:0.1", "--overlay", "no", "--view", "--view-address", "0", *arguments)
         page = self.told(play, r"open (http\S+) in a browser")
         program = self.start(OPENIGTLINK, page, "--listen", "127.0.0.1:0")
         port = int(self.told(program, r"OpenIGTLink clients find the run at 127\.0\.0\.1, port (\d+)"))

@@ -639,7 +639,7 @@ class FailedRecording(OutputTest):
 
     def test_without_a_clock(self):
         self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1.3\n20,0.5,0.5,1.05\n")
-        result = self.play("--record", "t.mcap", "--report", "r.json", device="script:long.csv", preexec_fn=self.small_disk)
+        result = self.play("--record", "t.mcap", "--report", "r.json", "--overlay", "no", device="script:long.csv", preexec_fn=self.small_disk)
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn("warning: the recording failed", result.stderr)
         report = json.loads((self.folder / "r.json").read_text())

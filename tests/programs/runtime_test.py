@@ -384,12 +384,12 @@ class Play(ProgramTest):
     def test_tells_of_a_tool_that_presses_on_what_is_held(self):
         file = self.bake(cube_toml(4))
         script = self.write("below.csv", "t,x,y,z\n0,0.5,0.5,-0.2\n0.1,0.5,0.5,-0.09\n0.2,0.5,0.5,-0.09\n0.3,0.5,0.5,-0.2\n")
-        play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1", "--report", "-")
+        play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1", "--overlay", "no", "--report", "-")
         rigid = self.play(file, *play, "--record", "rigid.mcap")
         coupled = self.play(file, *play, "--coupling", "0.5")
         limited = self.play(file, *play, "--max-force", "0.25")
         above = self.write("above.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.09\n0.2,0.5,0.5,1.09\n")
-        free = self.play(file, "--device", f"script:{above}", "--fast", "--tool", "sphere:0.1", "--report", "-")
+        free = self.play(file, "--device", f"script:{above}", "--fast", "--tool", "sphere:0.1", "--overlay", "no", "--report", "-")
         for result, words in ((rigid, "wall and not the body's"), (coupled, "its coupling alone"), (limited, "wall and not the body's")):
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads(result.stdout)
@@ -515,7 +515,8 @@ class PlayOverlay(ProgramTest):
         fine = self.bake(cube_toml(4, scope="full"), name="fine.toml")
         script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.17\n0.3,0.45,0.5,1.17\n")
         forces, surfaces = [], []
-        for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ())):
+        for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ("--overlay", "no"))):
+            has_patches = file == coarse
             result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.mcap",
                          "--surface", "out.vtu", "--report", "report.json", "--force", *overlay, cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
@@ -524,15 +525,15 @@ class PlayOverlay(ProgramTest):
             forces.append(recording["force"])
             options = recording.info["options"].splitlines()
             self.assertEqual([line for line in options if line.startswith("overlay=")],
-                             [f"overlay={overlay[1]}"] if overlay else [])
+                             [f"overlay={overlay[1]}"])
             touched = recording["contacts"] > 0
             self.assertTrue(touched[-1])
-            self.assertEqual((recording["patch"][touched] >= 0).all(), bool(overlay))
-            if overlay:
+            self.assertEqual((recording["patch"][touched] >= 0).all(), has_patches)
+            if has_patches:
                 self.assertEqual((report["overlay"]["refinement"], report["overlay"]["rings"]), (2, 4))
                 self.assertEqual(report["overlay"]["older_ticks_in_contact"], 0)
                 self.assertRegex(result.stderr, r"overlay: \d+ patches built")
-            self.assertEqual("overlay" in report, bool(overlay))
+            self.assertEqual("overlay" in report, has_patches)
             grid = read_grid(self.folder / "out.vtu")
             surfaces.append((vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("displacement"))))
         largest = numpy.abs(forces[1]).max()

@@ -337,7 +337,7 @@ class Keeping(Sample):
 FEATURES = {
     "Contact without penalty springs.": ["press", "friction", "grab", "tools", "coupling", "palm", "two_tools"],
     "Elements that do not lock.": ["elements", "nodule", "gravity", "plane"],
-    "A fine mesh where you touch.": ["overlay"],
+    "A fingertip feels the body, not its mesh.": ["overlay"],
     "Dynamics.": ["swing", "inertia"],
     "Live bodies": ["fall", "drawing", "deep"],
     "Devices.": ["device"],

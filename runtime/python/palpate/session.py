@@ -43,7 +43,10 @@ class Tool:
 
 @dataclasses.dataclass
 class Overlay:
-    """A finer mesh under the tools: elements within `rings` rings are cut into refinement^3 (in the plane refinement^2)."""
+    """A finer mesh under the tools: elements within `rings` rings are cut into refinement^3 (in the plane refinement^2).
+
+    Refinement 0 is no mesh, but the body's own compliance close to the tools, as `palpate-runtime play` has by default.
+    """
 
     refinement: int = 3
     rings: int = 2

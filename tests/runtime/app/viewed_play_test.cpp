@@ -221,8 +221,8 @@ TEST_F(ViewedPlayTest, TheReportIsOfTheWholeRun) {
   const LoopReport report = finish();
   EXPECT_GT(report.ticks, 430);
   EXPECT_GT(report.ticks_in_contact, 100);
-  EXPECT_GT(report.largest_force, 0.01);
-  EXPECT_GT(report.largest_shown, 0.01);
+  EXPECT_GT(report.largest_force, 0.004);
+  EXPECT_GT(report.largest_shown, 0.004);
   EXPECT_LT(report.largest_force_time, 0.001 * static_cast<double>(report.ticks));
   EXPECT_EQ(report.compute.total(), report.ticks);
   EXPECT_EQ(report.lateness.total(), report.ticks);

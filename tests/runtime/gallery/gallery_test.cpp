@@ -343,7 +343,8 @@ TEST(GalleryScene, OfARecordingIsAsItWasPressedMost) {
   };
   const std::filesystem::path file = folder.path() / "a.mcap";
   RecordingWriter writer(
-      file, {model.string(), body.model().content_hash, "script", 1000, "tool=sphere:0.1\n"}, surface);
+      file, {model.string(), body.model().content_hash, "script", 1000, "tool=sphere:0.1\noverlay=no\n"},
+      surface);
   for (const std::int64_t tick : {0, 1, 2}) {
     const float force = tick == 1 ? 0.02F : 0.01F;
     writer.append(TickRecord{.time = 1e-3 * static_cast<double>(tick), .force = {0, 0, -force}});

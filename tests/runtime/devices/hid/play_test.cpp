@@ -200,10 +200,23 @@ class PlayedDevice : public ::testing::Test {
   [[nodiscard]] static std::unique_ptr<Program> play(std::vector<std::string> arguments,
                                                      const std::string& safety = patient) {
     const std::string program = palpate::test::built_file("runtime/palpate-runtime");
-    std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
-                                     "hid",   "--tool",   "sphere:0.01",      "--safety",
-                                     safety,  "--record", "session.mcap",     "--record-frames",
-                                     "0",     "--report", "report.json"};
+    std::vector<std::string> line = {program,
+                                     "play",
+                                     "cube.palpate.hdf",
+                                     "--device",
+                                     "hid",
+                                     "--tool",
+                                     "sphere:0.01",
+                                     "--overlay",
+                                     "no",
+                                     "--safety",
+                                     safety,
+                                     "--record",
+                                     "session.mcap",
+                                     "--record-frames",
+                                     "0",
+                                     "--report",
+                                     "report.json"};
     if (std::ranges::find(arguments, "--origin") == arguments.end()) {
       arguments.emplace_back("--origin");
       arguments.emplace_back(at_touch);
