@@ -12,7 +12,7 @@ struct MetSurface {
   bool operator==(const MetSurface&) const = default;
 };
 
-/// That for a tool of this radius [m], for which a mesh of simplices with longer edges than a fifth of it is
+/// Surface for a tool of this radius [m], for which a mesh of simplices with longer edges than a fifth of it is
 /// too coarse.
 [[nodiscard]] MetSurface met_surface(const Model& model, double radius);
 

@@ -286,12 +286,13 @@ class Hdf5(ExportTest):
             reader.SetFileName(str(self.folder / "last.vtu"))
             reader.Update()
             data = reader.GetOutput().GetPointData()
-            u = vtk_to_numpy(data.GetArray("displacement"))
+            mesh = slice(self.frames["displacement"].shape[1])  # the file has the finer surface that tools meet, too
+            u = vtk_to_numpy(data.GetArray("displacement"))[mesh]
             self.assertGreater(abs(u).max(), 0.001)
             numpy.testing.assert_allclose(self.frames["displacement"][-1], u, rtol=1e-5, atol=1e-8)
             for name in ("von_mises", "pressure"):
                 shown = vtk_to_numpy(data.GetArray(name))
-                numpy.testing.assert_allclose(self.frames[name][-1], shown, rtol=1e-4, atol=1e-5 * numpy.nanmax(abs(shown)), err_msg=name)
+                numpy.testing.assert_allclose(self.frames[name][-1], shown[mesh], rtol=1e-4, atol=1e-5 * numpy.nanmax(abs(shown)), err_msg=name)
             held = self.ticks.surface["held"] == 2 ** self.simplices.shape[1] - 1
             self.assertTrue((numpy.isfinite(self.frames["von_mises"][-1]) | held).all())
 

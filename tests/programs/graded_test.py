@@ -91,7 +91,7 @@ class Ball(ProgramTest):
         for element, of_mesh in (("tet4", 2.5), ("tet10", 1.3)):
             mean, ripple, change, report = self.slide(element)
             self.assertLess(abs(mean / 0.98 - 1.0), 0.03)  # the whole ball gives way too
-            self.assertLess(ripple, 0.01)
+            self.assertLess(ripple, 0.015)  # and what the ball gives way less near what is held
             self.assertLess(change, 0.003)
             self.assertNotIn("overlay", report)
             self.assertGreater(self.slide(element, "--overlay", "no")[0], of_mesh)
@@ -124,7 +124,7 @@ class Ball(ProgramTest):
     def test_pictures_show_the_dent(self):
         recording, _ = self.play("tet4", self.script)
         done(RUNTIME, "play", self.files["tet4"], "--device", f"script:{self.script}", "--tool", f"sphere:{self.TOOL}", "--friction", "0", "--fast",
-                     "--surface", "last.vtu")
+                     "--surface", self.folder / "last.vtu")
         done(RUNTIME, "export", recording, "--hdf5", self.folder / "run.h5")
         with h5py.File(self.folder / "run.h5") as file:
             nodes, moved = file["/surface/nodes"][...], file["/frames/displacement"][-1]

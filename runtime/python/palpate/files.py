@@ -269,10 +269,16 @@ class Recording:
 
     @property
     def surface(self) -> dict[str, NDArray[Any]]:
-        """`nodes` [N, 3] without loads [m], `simplices` [F, d], `held` [S]: bit 0, 1, 2 where held along x, y, z.
+        """`nodes` [S, 3] without loads [m], `simplices` [F, d], `held` [S]: bit 0, 1, 2 where held along x, y, z."""
+        surface = self._surface()
+        return surface | {"nodes": surface["nodes"][: len(surface["held"])]}
 
-        The first S nodes are those of the pictures; on the others tools press too, where that is finer than the mesh.
-        """
+    @property
+    def pressed_nodes(self) -> NDArray[Any]:
+        """[N, 3] nodes that /contacts names, without loads [m]: those of the surface, and where tools meet a finer one its own behind them."""
+        return self._surface()["nodes"]
+
+    def _surface(self) -> dict[str, NDArray[Any]]:
         told = self.messages("/surface")
         if not len(told):
             raise Error(f"{self._file.path} has no surface", "record again without --record-frames 0")
