@@ -28,7 +28,10 @@ Tool tool_of(const Settings& settings, const Body& body) {
 }
 
 bool has_patches(const Settings& settings, const Body& body) {
-  return body.refinement() > 1 && settings.overlay.has_patches();
+  const Mesh& mesh = body.model().mesh;
+  return body.refinement() > 1 && settings.overlay.has_patches() &&
+         (settings.overlay.kind != OverlayKind::graded ||
+          traits(mesh.element).corners == mesh.dimension() + 1);
 }
 
 State state_of(const Settings& settings, const Body& body, const Tool& tool) {

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "matrices/hierarchical.h"
 #include "meshes/surface.h"
+#include "runtime/body/met_surface.h"
 #include "runtime/body/surface_numbering.h"
 #include "runtime/core/body/local_compliance.h"
 #include "runtime/core/body/modal_newmark.h"
@@ -200,7 +201,7 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   parts.simplices = fine.simplices;
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
-  const bool is_local = local && model.dimension() == 3 && contact == ContactModel::quasi_static;
+  const bool is_local = local && is_even(model) && contact == ContactModel::quasi_static;
   LocalParts of_local = is_local ? local_parts(model, fine) : LocalParts{};
   return {std::move(parts), std::move(model),    std::move(stored_of_mesh),
           std::move(fine),  std::move(rounding), std::move(of_local)};

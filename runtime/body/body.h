@@ -19,9 +19,10 @@ class Body : public ElasticBody {
  public:
   /// Takes over the model and unfolds its Green's functions. The contact surface consists of the elements'
   /// facets, each element divided into r^d for `refinement` r > 1, as in the overlays to be used, on flat
-  /// facets. `local`: with a LocalCompliance, if in space and quasi-static, and rounded (Rounding) if
-  /// refined. Throws Error if no free surface node is stored, since the body could not be touched, if the
-  /// sizes of the model's parts are inconsistent, or for dynamic contact with a model without dynamics.
+  /// facets. `local`: with a LocalCompliance, if it is even (is_even) and quasi-static, and rounded
+  /// (Rounding) if refined. Throws Error if no free surface node is stored, since the body could not be
+  /// touched, if the sizes of the model's parts are inconsistent, or for dynamic contact with a model without
+  /// dynamics.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
                 ContactModel contact = ContactModel::quasi_static, bool local = false);
   /// Body that is solved during the touch; `live` comes from `live_model` of the same model.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "meshes/element.h"
 #include "runtime/body/fine_surface.h"
@@ -9,24 +10,35 @@
 namespace palpate {
 namespace {
 
-/// Mean edge of the surface [m]; of tet10 half of an element's.
+/// Edge that half of the surface's simplices have longer than this [m]: where a mesh is graded most are
+/// small. Of tet10 half of an element's.
 double surface_edge(const Model& model) {
   const auto d = static_cast<std::size_t>(model.dimension());
-  double sum = 0.0;
+  std::vector<double> edges;
   for (std::size_t s = 0; s < model.surface.size(); s += d)
-    sum += (model.mesh.nodes[model.surface[s]] - model.mesh.nodes[model.surface[s + 1]]).norm();
-  return sum / static_cast<double>(model.surface.size() / d);
+    edges.push_back((model.mesh.nodes[model.surface[s]] - model.mesh.nodes[model.surface[s + 1]]).norm());
+  const auto middle = edges.begin() + std::ssize(edges) / 2;
+  std::nth_element(edges.begin(), middle, edges.end());
+  return *middle;
 }
 
 }  // namespace
+
+bool is_even(const Model& model) noexcept {
+  const Material& first = model.materials.front();
+  return model.dimension() == 3 &&
+         std::all_of(model.materials.begin(), model.materials.end(), [&](const Material& material) {
+           return material.youngs_modulus == first.youngs_modulus &&
+                  material.poissons_ratio == first.poissons_ratio;
+         });
+}
 
 MetSurface met_surface(const Model& model, double radius) {
   constexpr double spacing = 0.15;     // [radius] between the nodes that the tool meets
   constexpr double fine_enough = 0.2;  // [radius] edges
   constexpr double most_nodes = 4e5;   // some 150 bytes each, and a second of loading
   const double edge = surface_edge(model);
-  const bool is_of_simplices = traits(model.mesh.element).corners == model.dimension() + 1;
-  if (!is_of_simplices || !(edge > fine_enough * radius)) return {};
+  if (!(edge > fine_enough * radius)) return {};
   const double corners = 0.5 * static_cast<double>(model.surface.size()) / model.dimension();
   const int refinement =
       std::min({std::max(static_cast<int>(std::ceil(edge / (spacing * radius))), least_refinement),

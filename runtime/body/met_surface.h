@@ -12,8 +12,11 @@ struct MetSurface {
   bool operator==(const MetSurface&) const = default;
 };
 
-/// Surface for a tool of this radius [m], for which a mesh of simplices with longer edges than a fifth of it is
-/// too coarse.
+/// Surface for a tool of this radius [m], for which the mesh of a body of one material is too coarse if its
+/// edges are longer than a fifth of it.
 [[nodiscard]] MetSurface met_surface(const Model& model, double radius);
+
+/// True if a body is in space and as stiff everywhere, so that close to its surface it is a half-space.
+[[nodiscard]] bool is_even(const Model& model) noexcept;
 
 }  // namespace palpate

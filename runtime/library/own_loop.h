@@ -52,7 +52,7 @@ inline Body make_body(Model model, const StateOptions& options, const palpate_ov
   double radius = std::numeric_limits<double>::infinity();
   for (const Tool& tool : options.tools)
     radius = std::min(radius, tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius);
-  const bool is_static = contact == ContactModel::quasi_static && model.dimension() == 3;
+  const bool is_static = contact == ContactModel::quasi_static && is_even(model);
   const MetSurface met = is_static && radius > 0.0 ? met_surface(model, radius) : MetSurface{};
   return Body(std::move(model), {}, met.refinement, contact, met.is_local);
 }

@@ -112,7 +112,8 @@ typedef struct palpate_overlay {
 
 /* In the place of a refinement: no finer mesh, but close to the tools the body's own compliance in place of
  * its mesh's, as palpate-runtime play has by default (docs/overlays.md); the surface is refined for the
- * smallest tool. Needs no layers. Of no effect where that is not possible. */
+ * smallest tool, so give room for 256 contact points. Needs no layers. Of no effect where that is not
+ * possible. */
 #define PALPATE_OVERLAY_LOCAL 0
 
 /* Default overlay: refinement 3, 2 rings, 512 MB. */

@@ -4,7 +4,7 @@ import time
 import numpy
 import palpate
 
-with palpate.Session("block.palpate.hdf", palpate.Tool(radius=0.01)) as session:
+with palpate.Session("block.palpate.hdf", palpate.Tool(radius=0.01), max_contacts=256, overlay=palpate.Overlay(refinement=0)) as session:
     session.record("loop.mcap")
     with palpate.Loop(session, lambda t: (0.03, 0.03, max(0.036, 0.0402 - 0.01 * t))) as loop:
         while loop.felt is None or loop.felt.tool_position[2] > 0.036:

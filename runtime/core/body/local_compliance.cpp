@@ -225,7 +225,9 @@ class MeshPart {
     return 0.5 / weight * (sum + sum.transpose());
   }
 
-  void enter(Index a, Index b, const Mat3& D, std::vector<std::vector<SmoothGreens::Block>>& rows) const {
+  void enter(Index a, Index b, const Mat3& of_all,
+             std::vector<std::vector<SmoothGreens::Block>>& rows) const {
+    const Mat3 D = points_[at(a)].part * points_[at(b)].part * of_all;
     rows[at(stored(a))].push_back({stored(b), D.cast<float>()});
     if (a != b) rows[at(stored(b))].push_back({stored(a), D.transpose().cast<float>()});
   }
@@ -299,27 +301,51 @@ void LocalCompliance::follow(const ElasticBody& body, const LocalParts& parts) {
     const Eigen::MatrixXd own = body.greens().block(stored, stored);
     for (Eigen::Index axis = 0; axis < 3; ++axis) free[at(stored)][axis] = own(axis, axis) > 0.0 ? 1.0 : 0.0;
   }
+  fade_at_planes(body, free);
   for (std::size_t node = 0; node < points_.size(); ++node) {
     const SurfaceParts of_node = body.surface_parts(static_cast<Index>(node));
-    double reach = 0.0, weight = 0.0;
+    double reach = 0.0, weight = 0.0, faded = 0.0;
     for (std::size_t k = 0; k < of_node.stored.size(); ++k) {
       points_[node].share += of_node.weights[k] * free[at(of_node.stored[k])];
       const double part = std::abs(of_node.weights[k]);
       reach += part * points_[at(body.surface_node_of_stored(of_node.stored[k]))].reach;
+      faded += part * points_[at(body.surface_node_of_stored(of_node.stored[k]))].part;
       weight += part;
     }
-    if (node >= of_body) points_[node].reach = weight > 0.0 ? reach / weight : edges_of_reach * mean;
+    if (node < of_body) continue;
+    points_[node].reach = weight > 0.0 ? reach / weight : edges_of_reach * mean;
+    points_[node].part = weight > 0.0 ? faded / weight : 1.0;
   }
+}
+
+/// Planes of symmetry mirror a force, which the half-space knows nothing of: leaves it to the mesh there.
+void LocalCompliance::fade_at_planes(const ElasticBody& body, const std::vector<Vec3>& free) {
+  const std::span<const Index> stored = body.surface_stored_nodes();
+  const auto is_held_in_part = [&](std::size_t node) {
+    return stored[node] >= 0 && free[at(stored[node])].minCoeff() == 0.0;
+  };
+  double reach = 0.0;
+  for (std::size_t node = 0; node < stored.size(); ++node) {
+    reach = std::max(reach, points_[node].reach);
+    if (is_held_in_part(node)) points_[node].part = 0.0;
+  }
+  for_each_pair(points_, stored.size(), reach, [&](Index a, Index b) {
+    for (const auto& [node, other] : {std::pair(a, b), std::pair(b, a)}) {
+      if (!is_held_in_part(at(other))) continue;
+      const double q = (points_[at(node)].x - points_[at(other)].x).norm() / points_[at(node)].reach;
+      points_[at(node)].part = std::min(points_[at(node)].part, q * q * (3.0 - 2.0 * std::min(q, 1.0)));
+    }
+  });
 }
 
 Vec3 LocalCompliance::displacement(const Point& a, const Point& b, const Vec3& force) noexcept {
   const Vec3 x = a.x - b.x;
   const double squared = x.squaredNorm(), sum_of_reaches = a.reach + b.reach;
   if (4.0 * squared >= sum_of_reaches * sum_of_reaches) return Vec3::Zero();
-  const double share = share_of_sides(a, b);
+  const double share = a.part * b.part * share_of_sides(a, b);
   if (share < least_share) return Vec3::Zero();
   const Vec3 f = b.share.cwiseProduct(force);
-  if (squared == 0.0) return a.share.cwiseProduct(half_space(a) * f);
+  if (squared == 0.0) return a.part * b.part * a.share.cwiseProduct(half_space(a) * f);
   const double r = std::sqrt(squared), nu = 0.5 * (a.nu + b.nu);
   const Vec3 n = (a.normal + b.normal).normalized(), q = (x - n * n.dot(x)) / r;
   const double along = q.dot(f), turned = 0.5 * (1.0 - 2.0 * nu);
@@ -329,9 +355,9 @@ Vec3 LocalCompliance::displacement(const Point& a, const Point& b, const Vec3& f
 
 Mat3 LocalCompliance::between(Index node, Index loaded) const noexcept {
   const Point &a = points_[at(node)], &b = points_[at(loaded)];
-  if (node == loaded) return along_free_axes(half_space(a), a, a);
+  if (node == loaded) return a.part * a.part * along_free_axes(half_space(a), a, a);
   const double left = left_at((a.x - b.x).norm(), a, b);
-  const double share = share_of_sides(a, b);
+  const double share = a.part * b.part * share_of_sides(a, b);
   if (left == 0.0 || share < least_share) return Mat3::Zero();
   return left * share * along_free_axes(half_space(a, b), a, b);
 }

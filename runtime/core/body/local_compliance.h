@@ -49,6 +49,7 @@ class LocalCompliance {
     double c = 0.0;             ///< (1 + nu) / (pi E) [1/Pa]
     double nu = 0.0;
     double reach = 0.0;  ///< [m] four edges
+    double part = 1.0;   ///< of B and D that count: less near nodes that are held along some axes, 0 there
     double disc = 0.0;   ///< radius of the disc as large as its part of the surface [m]
   };
   [[nodiscard]] const Point& point(Index node) const noexcept {
@@ -62,6 +63,7 @@ class LocalCompliance {
  private:
   void measure(const ElasticBody& body, const LocalParts& parts);
   void follow(const ElasticBody& body, const LocalParts& parts);
+  void fade_at_planes(const ElasticBody& body, const std::vector<Vec3>& free);
 
   std::vector<Point> points_;  // [S]
   double reach_ = 0.0;
