@@ -147,8 +147,9 @@ Json json_safety(const LoopReport& report) {
 
 Json json_surface(const PlayedRun& run) {
   const Body& body = run.body;  // against the mesh, after the last tick
-  const SurfaceChange change = surface_change(body.dimension(), body.simplices(), body.surface_in_mesh(),
-                                              displacement_from_mesh(body, run.state));
+  const SurfaceChange change =
+      surface_change(body.dimension(), body.drawn_simplices(), body.surface_in_mesh(),
+                     displacement_from_mesh(body, run.state));
   const std::optional<double> studied = studied_rotation(body);
   return {{"last_rotation_deg", degrees_a_radian * change.rotation},
           {"last_strain", change.strain},

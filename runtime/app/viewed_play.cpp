@@ -397,7 +397,7 @@ void ViewedPlay::take_change(const SurfaceFrame& frame) {
   std::vector<Vec3> u(mesh.size());
   for (std::size_t node = 0; node < u.size(); ++node)
     u[node] = Eigen::Map<const Eigen::Vector3f>(frame.displacement.data() + 3 * node).cast<double>();
-  const SurfaceChange change = surface_change(body_->dimension(), body_->simplices(), mesh, u);
+  const SurfaceChange change = surface_change(body_->dimension(), body_->drawn_simplices(), mesh, u);
   const std::lock_guard lock(mutex_);
   state_.change = change;
 }

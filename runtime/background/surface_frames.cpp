@@ -5,7 +5,6 @@
 #include <chrono>
 
 #include "base/vectors.h"
-#include "meshes/surface.h"
 #include "runtime/background/element_stress.h"
 #include "runtime/core/body/surface_load.h"
 #include "runtime/core/touch/contact_nodes.h"
@@ -171,13 +170,11 @@ void SurfaceFrames::show_interior(SurfacePicture& picture) {
 }
 
 RecordedSurface recorded_surface(const Body& body) {
-  RecordedSurface surface{
-      body.surface_in_mesh(), body.dimension(), {body.simplices().begin(), body.simplices().end()}};
+  RecordedSurface surface{body.surface_in_mesh(), body.dimension(), body.drawn_simplices()};
   if (body.local() != nullptr) {
     const auto own = surface.nodes.begin() + std::ssize(body.surface_stored_nodes());
     surface.finer.assign(own, surface.nodes.end());
     surface.nodes.erase(own, surface.nodes.end());
-    surface.simplices = number_surface(body.model().surface, body.model().mesh.nodes.size()).simplices;
   }
   for (std::size_t node = 0; node < surface.nodes.size(); ++node)
     surface.held.push_back(held_axes(body, node));

@@ -224,6 +224,11 @@ Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptio
   live_ = std::move(live);
 }
 
+std::vector<Index> Body::drawn_simplices() const {
+  if (local() != nullptr) return number_surface(model_.surface, model_.mesh.nodes.size()).simplices;
+  return {simplices().begin(), simplices().end()};
+}
+
 std::vector<Vec3> Body::surface_in_mesh() const {
   std::vector<Vec3> positions(surface_rest_positions().size(), Vec3::Zero());
   for (std::size_t node = 0; node < positions.size(); ++node) {

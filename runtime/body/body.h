@@ -46,6 +46,9 @@ class Body : public ElasticBody {
   [[nodiscard]] std::span<const Index> surface_mesh_nodes() const noexcept { return fine_.mesh_nodes; }
   /// The refined surface, by which the nodes of overlays on it are found.
   [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }
+  /// Simplices of the surface that is drawn and recorded: with a local compliance the mesh's own, whose nodes
+  /// come first, else those that tools meet.
+  [[nodiscard]] std::vector<Index> drawn_simplices() const;
   /// [S] positions in the mesh, without loads [m].
   [[nodiscard]] std::vector<Vec3> surface_in_mesh() const;
   /// Position of a surface node on the flat facets of the mesh [m].
