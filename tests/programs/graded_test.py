@@ -94,6 +94,8 @@ class Ball(ProgramTest):
             self.assertLess(ripple, 0.015)  # and what the ball gives way less near what is held
             self.assertLess(change, 0.003)
             self.assertNotIn("overlay", report)
+            self.assertLess(report["surface"]["last_strain"], 0.5)  # of the mesh's triangles, not of the dent's
+            self.assertLess(report["surface"]["last_rotation_deg"], 45)
             self.assertGreater(self.slide(element, "--overlay", "no")[0], of_mesh)
 
     def test_an_own_loop_feels_the_same(self):
