@@ -17,6 +17,7 @@
 #include "runtime/body/body.h"
 #include "runtime/body/met_surface.h"
 #include "runtime/core/tick/state.h"
+#include "runtime/core/touch/tool_geometry.h"
 #include "runtime/library/guarded.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/session_recording.h"
@@ -50,8 +51,7 @@ inline Body make_body(Model model, const StateOptions& options, const palpate_ov
                       ContactModel contact) {
   if (overlay.refinement > 0) return Body(std::move(model), {}, overlay.refinement, contact);
   double radius = std::numeric_limits<double>::infinity();
-  for (const Tool& tool : options.tools)
-    radius = std::min(radius, tool.disc_radius > 0.0 ? tool.disc_radius : tool.radius);
+  for (const Tool& tool : options.tools) radius = std::min(radius, has_point_core(tool) ? tool.radius : 0.0);
   const bool is_static = contact == ContactModel::quasi_static && is_even(model);
   const MetSurface met = is_static && radius > 0.0 ? met_surface(model, radius) : MetSurface{};
   return Body(std::move(model), {}, met.refinement, contact, met.is_local);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "runtime/core/touch/tool_geometry.h"
 #include "runtime/loop/numbers.h"
 #include "runtime/loop/settings.h"
 
@@ -25,9 +26,12 @@ WorkspaceOptions Settings::workspace() const {
 }
 
 BodyOptions Settings::body() const {
-  const bool is_static = contact == ContactModel::quasi_static && !live.solver && !warp;
-  const bool by_radius = overlay.kind == OverlayKind::graded ||
-                         (overlay.kind == OverlayKind::local && is_static && overlay_law == PatchLaw::linear);
+  // A capsule or disc touches faces and edges as well: of a fine surface far too many.
+  const bool is_possible =
+      has_point_core(tool) && contact == ContactModel::quasi_static && !live.solver && !warp;
+  const bool by_radius =
+      overlay.kind == OverlayKind::graded ||
+      (overlay.kind == OverlayKind::local && is_possible && overlay_law == PatchLaw::linear);
   return {.refinement = overlay.kind == OverlayKind::uniform ? overlay.refinement : 1,
           .radius = by_radius ? radius() : 0.0,
           .graded = overlay.kind == OverlayKind::graded,
