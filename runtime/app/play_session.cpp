@@ -28,10 +28,7 @@ Tool tool_of(const Settings& settings, const Body& body) {
 }
 
 bool has_patches(const Settings& settings, const Body& body) {
-  const Mesh& mesh = body.model().mesh;
-  return body.refinement() > 1 && settings.overlay.has_patches() &&
-         (settings.overlay.kind != OverlayKind::graded ||
-          traits(mesh.element).corners == mesh.dimension() + 1);
+  return body.refinement() > 1 && settings.overlay.has_patches();
 }
 
 State state_of(const Settings& settings, const Body& body, const Tool& tool) {

@@ -154,17 +154,6 @@ void follow_body(const FineSurface& fine, const Model& model, const std::vector<
   }
 }
 
-/// The material below each part of the surface, and the surface as it is meshed.
-LocalParts local_parts(const Model& model, const FineSurface& fine) {
-  LocalParts local{.simplices = number_surface(model.surface, model.mesh.nodes.size()).simplices};
-  for (const Index element : fine.element) {
-    const Material& material = model.materials[model.material_of_element[element]];
-    local.youngs_modulus.push_back(material.youngs_modulus);
-    local.poissons_ratio.push_back(material.poissons_ratio);
-  }
-  return local;
-}
-
 }  // namespace
 
 struct Body::Made {
@@ -173,7 +162,7 @@ struct Body::Made {
   std::vector<Index> stored_of_mesh;
   FineSurface fine;
   std::shared_ptr<const Rounding> rounding;
-  LocalParts local;  // empty: contact meets the mesh's compliance
+  bool is_local;  // else contact meets the mesh's compliance
 };
 
 Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
@@ -202,9 +191,8 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
   const bool is_local = local && is_even(model) && contact == ContactModel::quasi_static;
-  LocalParts of_local = is_local ? local_parts(model, fine) : LocalParts{};
   return {std::move(parts), std::move(model),    std::move(stored_of_mesh),
-          std::move(fine),  std::move(rounding), std::move(of_local)};
+          std::move(fine),  std::move(rounding), is_local};
 }
 
 Body::Body(Made made)
@@ -213,7 +201,10 @@ Body::Body(Made made)
       stored_of_mesh_(std::move(made.stored_of_mesh)),
       fine_(std::move(made.fine)),
       rounding_(std::move(made.rounding)) {
-  if (!made.local.simplices.empty()) take_local(std::make_shared<const LocalCompliance>(*this, made.local));
+  if (!made.is_local) return;
+  const Material& material = model_.materials.front();
+  take_local(std::make_shared<const LocalCompliance>(*this, mesh_simplices(), material.youngs_modulus,
+                                                     material.poissons_ratio));
 }
 
 Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool local)
@@ -224,9 +215,12 @@ Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptio
   live_ = std::move(live);
 }
 
+std::vector<Index> Body::mesh_simplices() const {
+  return number_surface(model_.surface, model_.mesh.nodes.size()).simplices;
+}
+
 std::vector<Index> Body::drawn_simplices() const {
-  if (local() != nullptr) return number_surface(model_.surface, model_.mesh.nodes.size()).simplices;
-  return {simplices().begin(), simplices().end()};
+  return local() != nullptr ? mesh_simplices() : std::vector<Index>(simplices().begin(), simplices().end());
 }
 
 std::vector<Vec3> Body::surface_in_mesh() const {

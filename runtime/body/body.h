@@ -57,6 +57,8 @@ class Body : public ElasticBody {
   [[nodiscard]] const Rounding* rounding() const noexcept { return rounding_.get(); }
 
  private:
+  [[nodiscard]] std::vector<Index> mesh_simplices() const;
+
   struct Made;
   static Made make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
                    bool local);

@@ -46,7 +46,8 @@ inline StateOptions with_room(StateOptions options, const Body& body, const palp
   return options;
 }
 
-/// The body that tools meet; overlays of refinement 0 are a LocalCompliance for the smallest of them.
+/// The body that tools meet: for an overlay of refinement 0 with a LocalCompliance that suits the smallest
+/// tool.
 inline Body make_body(Model model, const StateOptions& options, const palpate_overlay& overlay,
                       ContactModel contact) {
   if (overlay.refinement > 0) return Body(std::move(model), {}, overlay.refinement, contact);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/loop/loading.h"
 #include "runtime/loop/tick_record.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/safety/safety.h"
@@ -28,7 +29,10 @@ SessionRecording::SessionRecording(const Body& body, const State& state, const O
       start_(monotonic_now()),
       recorder_(options.file, info_of(options, body), recorded_surface(body)) {
   if (!(options.pictures > 0.0)) return;
-  const bool contacts_only = pictures_follow_from_contacts(body);
+  // A surface that is fine for another tool than the recorded one is not made again from its settings.
+  const bool contacts_only =
+      pictures_follow_from_contacts(body) &&
+      met_surface(body.model(), options.settings.body()).refinement == body.refinement();
   frames_.emplace(body, state,
                   SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(rate_, options.pictures),
                                        .contacts_only = contacts_only},

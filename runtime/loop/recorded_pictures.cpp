@@ -40,7 +40,7 @@ RecordedPictures::RecordedPictures(const RecordingFile& recording) : recording_(
   const Settings settings = read_settings(split_settings(recording.info().options));
   body_.reset(new Body(load_body(find_model(recording), {}, settings.body())));
   if (!pictures_follow_from_contacts(*body_) ||
-      recorded_surface(*body_).nodes.size() != recording.surface().nodes.size())
+      recorded_surface(*body_).pressed_nodes() != recording.surface().pressed_nodes())
     throw Error("has contact forces of another body than its model is", recording.path().string(),
                 "copy the file again, or record the session again");
   maker_ = std::make_unique<PictureMaker>(*body_);

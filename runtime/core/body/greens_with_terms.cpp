@@ -2,28 +2,22 @@
 #include <array>
 #include <utility>
 
-#include "runtime/core/body/greens.h"
+#include "runtime/core/body/greens_on_top.h"
 #include "runtime/core/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
 
-class GreensWithTerms final : public Greens {
+class GreensWithTerms final : public GreensOnTop {
  public:
   GreensWithTerms(std::shared_ptr<const Greens> greens, ExactTerms terms)
-      : Greens(greens->dimension(), greens->nodes(), greens->precision()),
-        greens_(std::move(greens)),
-        terms_(std::move(terms)) {}
+      : GreensOnTop(std::move(greens)), terms_(std::move(terms)) {}
 
   [[nodiscard]] const ExactTerms* exact_terms() const noexcept override { return &terms_; }
-  [[nodiscard]] bool unfolded() const noexcept override { return greens_->unfolded(); }
-  [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept override {
-    return greens_->compressed_form();
-  }
-  [[nodiscard]] const std::shared_ptr<const Greens>& without_terms() const noexcept { return greens_; }
+  [[nodiscard]] const std::shared_ptr<const Greens>& without_terms() const noexcept { return shared_below(); }
 
   void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
-    greens_->gather(row, columns, blocks);
+    below().gather(row, columns, blocks);
     const std::int64_t d = dimension();
     double* block = blocks.data();
     for (std::int64_t axis = 0; axis < d; ++axis) {
@@ -37,7 +31,7 @@ class GreensWithTerms final : public Greens {
 
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
-    greens_->displacement(nodes, f, ranges, u);
+    below().displacement(nodes, f, ranges, u);
     const std::int64_t d = dimension();
     std::array<double, most_exact_terms> sum;
     std::fill_n(sum.begin(), terms_.count, 0.0);
@@ -56,7 +50,6 @@ class GreensWithTerms final : public Greens {
   }
 
  private:
-  std::shared_ptr<const Greens> greens_;
   ExactTerms terms_;
 };
 

@@ -1,14 +1,13 @@
 #include "runtime/core/body/local_compliance.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <set>
 #include <utility>
 
 #include "runtime/core/body/elastic_body.h"
+#include "runtime/core/body/greens_on_top.h"
 
 namespace palpate {
 namespace {
@@ -37,22 +36,21 @@ double left_at(double distance, const Point& a, const Point& b) noexcept {
 }
 
 /// Displacement of the half-space's surface at `a` by a force at `b` (Johnson, Contact Mechanics, 1985, 3.2
-/// and 3.6) [m/N].
-Mat3 half_space(const Point& a, const Point& b) noexcept {
+/// and 3.6), times pi E / (1 + nu) [1/m].
+Mat3 half_space(const Point& a, const Point& b, double nu) noexcept {
   const Vec3 x = a.x - b.x, n = (a.normal + b.normal).normalized();
-  const double r = x.norm(), c = 0.5 * (a.c + b.c) / r, nu = 0.5 * (a.nu + b.nu);
-  const Vec3 q = x / r - n * n.dot(x) / r;
-  const Vec3 turned = 0.5 * (1.0 - 2.0 * nu) * q;
+  const double r = x.norm();
+  const Vec3 q = (x - n * n.dot(x)) / r, turned = 0.5 * (1.0 - 2.0 * nu) * q;
   Mat3 B = nu * q * q.transpose() + turned * n.transpose() - n * turned.transpose();
   B.diagonal().array() += 1.0 - nu;
-  return c * B;
+  return B / r;
 }
 
-/// Displacement of a node by the force on its own part of the surface [m/N].
-Mat3 half_space(const Point& a) noexcept {
-  Mat3 B = -0.5 * a.nu * a.normal * a.normal.transpose();
-  B.diagonal().array() += 1.0 - 0.5 * a.nu;
-  return of_lattice * a.c / a.disc * B;
+/// Displacement of a node by the force on its own part of the surface, times pi E / (1 + nu) [1/m].
+Mat3 half_space(const Point& a, double nu) noexcept {
+  Mat3 B = -0.5 * nu * a.normal * a.normal.transpose();
+  B.diagonal().array() += 1.0 - 0.5 * nu;
+  return of_lattice / a.disc * B;
 }
 
 /// Leaves what acts along free axes.
@@ -61,7 +59,7 @@ Mat3 along_free_axes(const Mat3& B, const Point& a, const Point& b) noexcept {
 }
 
 /// Xi - D, with D by blocks between stored nodes.
-class SmoothGreens final : public Greens {
+class SmoothGreens final : public GreensOnTop {
  public:
   /// Block of D in the row of a node.
   struct Block {
@@ -70,7 +68,7 @@ class SmoothGreens final : public Greens {
   };
 
   SmoothGreens(std::shared_ptr<const Greens> greens, std::vector<std::vector<Block>> rows)
-      : Greens(greens->dimension(), greens->nodes(), greens->precision()), greens_(std::move(greens)) {
+      : GreensOnTop(std::move(greens)) {
     first_.push_back(0);
     for (std::vector<Block>& row : rows) {
       std::sort(row.begin(), row.end(), [](const Block& a, const Block& b) { return a.column < b.column; });
@@ -79,14 +77,8 @@ class SmoothGreens final : public Greens {
     }
   }
 
-  [[nodiscard]] const ExactTerms* exact_terms() const noexcept override { return greens_->exact_terms(); }
-  [[nodiscard]] bool unfolded() const noexcept override { return greens_->unfolded(); }
-  [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept override {
-    return greens_->compressed_form();
-  }
-
   void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
-    greens_->gather(row, columns, blocks);
+    below().gather(row, columns, blocks);
     const std::size_t width = 3 * columns.size();
     const std::span<const Block> of_row = this->of(row);
     for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -102,7 +94,7 @@ class SmoothGreens final : public Greens {
 
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
-    greens_->displacement(nodes, f, ranges, u);
+    below().displacement(nodes, f, ranges, u);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Vec3 force(f[3 * k], f[3 * k + 1], f[3 * k + 2]);
       const std::span<const Block> of_node = of(nodes[k]);
@@ -127,7 +119,6 @@ class SmoothGreens final : public Greens {
                             [](const Block& block, Index wanted) { return block.column < wanted; });
   }
 
-  std::shared_ptr<const Greens> greens_;
   std::vector<std::size_t> first_;  // [stored + 1]
   std::vector<Block> blocks_;       // by rows, ascending
 };
@@ -153,11 +144,12 @@ void for_each_pair(const std::vector<Point>& points, std::size_t count, double r
 /// D from the nodes of the body's own surface, their neighbours and the smooth part at each.
 class MeshPart {
  public:
-  MeshPart(const ElasticBody& body, const LocalParts& parts, const std::vector<Point>& points)
-      : body_(body), points_(points), beside_(body.surface_stored_nodes().size()) {
-    for (std::size_t s = 0; s < parts.simplices.size(); s += 3) {
+  MeshPart(const ElasticBody& body, std::span<const Index> mesh, const std::vector<Point>& points, double c,
+           double nu)
+      : body_(body), points_(points), c_(c), nu_(nu), beside_(body.surface_stored_nodes().size()) {
+    for (std::size_t s = 0; s < mesh.size(); s += 3) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const Index a = parts.simplices[s + k], b = parts.simplices[s + (k + 1) % 3];
+        const Index a = mesh[s + k], b = mesh[s + (k + 1) % 3];
         beside_[at(a)].insert(b);
         beside_[at(b)].insert(a);
       }
@@ -199,11 +191,11 @@ class MeshPart {
     const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
     const double share = share_of_sides(of_a, of_b);
     if (share < least_share) return Mat3::Zero();
-    return share * along_free_axes(half_space(of_a, of_b), of_a, of_b);
+    return c_ * share * along_free_axes(half_space(of_a, of_b, nu_), of_a, of_b);
   }
 
   /// Mean of Xi - B at the nodes two edges away, where the mesh is right; of those one edge away if there are
-  /// none.
+  /// none. Zero if all of them are held.
   [[nodiscard]] Mat3 smooth_at(Index node) const {
     if (!is_free(node)) return Mat3::Zero();
     std::set<Index> ring;
@@ -221,7 +213,7 @@ class MeshPart {
       sum += share * xi(node, other) - near(node, other);
       weight += share;
     }
-    if (weight == 0.0) return xi(node, node);
+    if (weight == 0.0) return sum;
     return 0.5 / weight * (sum + sum.transpose());
   }
 
@@ -234,56 +226,51 @@ class MeshPart {
 
   const ElasticBody& body_;
   const std::vector<Point>& points_;
+  double c_, nu_;
   std::vector<std::set<Index>> beside_;  // [nodes of the body's surface]
   std::vector<Mat3> smooth_;             // [as these]
 };
 
 }  // namespace
 
-LocalCompliance::LocalCompliance(const ElasticBody& body, const LocalParts& parts)
-    : points_(body.surface_rest_positions().size()) {
-  measure(body, parts);
-  follow(body, parts);
+LocalCompliance::LocalCompliance(const ElasticBody& body, std::span<const Index> mesh, double E, double nu)
+    : c_((1.0 + nu) / (std::numbers::pi * E)), nu_(nu), points_(body.surface_rest_positions().size()) {
+  measure(body);
+  follow(body, mesh);
   for (const Point& point : points_) reach_ = std::max(reach_, point.reach);
   smooth_ = std::make_unique<const SmoothGreens>(body.shared_greens(),
-                                                 MeshPart(body, parts, points_).blocks(reach_));
+                                                 MeshPart(body, mesh, points_, c_, nu_).blocks(reach_));
 }
 
 LocalCompliance::~LocalCompliance() = default;
 
-/// Finds positions, normals, material and area of the surface's nodes.
-void LocalCompliance::measure(const ElasticBody& body, const LocalParts& parts) {
+/// Finds positions, normals and area of the surface's nodes.
+void LocalCompliance::measure(const ElasticBody& body) {
   const std::span<const Index> simplices = body.simplices();
   std::vector<double> area(points_.size(), 0.0);
   for (std::size_t k = 0; k < points_.size(); ++k) points_[k].x = body.surface_rest_positions()[k];
   for (std::size_t s = 0; s < simplices.size(); s += 3) {
     const Vec3 &a = point(simplices[s]).x, &b = point(simplices[s + 1]).x, &c = point(simplices[s + 2]).x;
     const Vec3 normal = 0.5 * (b - a).cross(c - a);
-    const double E = parts.youngs_modulus[s / 3], nu = parts.poissons_ratio[s / 3];
-    for (std::size_t k = 0; k < 3; ++k) {
-      Point& point = points_[at(simplices[s + k])];
-      point.normal += normal;
-      point.c += normal.norm() * (1.0 + nu) / (std::numbers::pi * E);
-      point.nu += normal.norm() * nu;
-      area[at(simplices[s + k])] += normal.norm();
+    for (const Index node : simplices.subspan(s, 3)) {
+      points_[at(node)].normal += normal;
+      area[at(node)] += normal.norm();
     }
   }
   for (std::size_t k = 0; k < points_.size(); ++k) {
     points_[k].normal.normalize();
-    points_[k].c /= area[k];
-    points_[k].nu /= area[k];
     points_[k].disc = std::sqrt(area[k] / 3.0 / std::numbers::pi);
   }
 }
 
 /// Finds the reach by the edges of the body's own mesh, and the axes that are free.
-void LocalCompliance::follow(const ElasticBody& body, const LocalParts& parts) {
+void LocalCompliance::follow(const ElasticBody& body, std::span<const Index> mesh) {
   const std::size_t of_body = body.surface_stored_nodes().size();
   std::vector<double> sum(of_body, 0.0), count(of_body, 0.0);
   double all = 0.0;
-  for (std::size_t s = 0; s < parts.simplices.size(); s += 3) {
+  for (std::size_t s = 0; s < mesh.size(); s += 3) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const Index a = parts.simplices[s + k], b = parts.simplices[s + (k + 1) % 3];
+      const Index a = mesh[s + k], b = mesh[s + (k + 1) % 3];
       const double length = (point(a).x - point(b).x).norm();
       for (const Index node : {a, b}) {
         sum[at(node)] += length;
@@ -292,7 +279,7 @@ void LocalCompliance::follow(const ElasticBody& body, const LocalParts& parts) {
       all += length;
     }
   }
-  const double mean = all / static_cast<double>(parts.simplices.size());
+  const double mean = all / static_cast<double>(mesh.size());
   std::vector<Vec3> free(at(body.greens().nodes()), Vec3::Ones());
   for (std::size_t node = 0; node < of_body; ++node) {
     points_[node].reach = edges_of_reach * (count[node] > 0.0 ? sum[node] / count[node] : mean);
@@ -338,28 +325,12 @@ void LocalCompliance::fade_at_planes(const ElasticBody& body, const std::vector<
   });
 }
 
-Vec3 LocalCompliance::displacement(const Point& a, const Point& b, const Vec3& force) noexcept {
-  const Vec3 x = a.x - b.x;
-  const double squared = x.squaredNorm(), sum_of_reaches = a.reach + b.reach;
-  if (4.0 * squared >= sum_of_reaches * sum_of_reaches) return Vec3::Zero();
-  const double share = a.part * b.part * share_of_sides(a, b);
-  if (share < least_share) return Vec3::Zero();
-  const Vec3 f = b.share.cwiseProduct(force);
-  if (squared == 0.0) return a.part * b.part * a.share.cwiseProduct(half_space(a) * f);
-  const double r = std::sqrt(squared), nu = 0.5 * (a.nu + b.nu);
-  const Vec3 n = (a.normal + b.normal).normalized(), q = (x - n * n.dot(x)) / r;
-  const double along = q.dot(f), turned = 0.5 * (1.0 - 2.0 * nu);
-  const Vec3 u = (1.0 - nu) * f + (nu * along + turned * n.dot(f)) * q - turned * along * n;
-  return left_at(r, a, b) * share * 0.5 * (a.c + b.c) / r * a.share.cwiseProduct(u);
-}
-
-Mat3 LocalCompliance::between(Index node, Index loaded) const noexcept {
-  const Point &a = points_[at(node)], &b = points_[at(loaded)];
-  if (node == loaded) return a.part * a.part * along_free_axes(half_space(a), a, a);
-  const double left = left_at((a.x - b.x).norm(), a, b);
-  const double share = a.part * b.part * share_of_sides(a, b);
+Mat3 LocalCompliance::between(const Point& a, const Point& b) const noexcept {
+  const double distance = (a.x - b.x).norm(), part = c_ * a.part * b.part;
+  if (distance == 0.0) return part * along_free_axes(half_space(a, nu_), a, b);
+  const double left = left_at(distance, a, b), share = share_of_sides(a, b);
   if (left == 0.0 || share < least_share) return Mat3::Zero();
-  return left * share * along_free_axes(half_space(a, b), a, b);
+  return part * left * share * along_free_axes(half_space(a, b, nu_), a, b);
 }
 
 }  // namespace palpate

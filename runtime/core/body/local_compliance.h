@@ -13,13 +13,6 @@ namespace palpate {
 
 class ElasticBody;
 
-/// Material of a body in space below its surface, and the surface as it is meshed.
-struct LocalParts {
-  std::vector<Index> simplices{};  ///< [3 x] surface nodes of the body's own triangles; empty: no such term
-  std::vector<double> youngs_modulus{};  ///< [F] below each triangle that tools meet [Pa]
-  std::vector<double> poissons_ratio{};  ///< [F]
-};
-
 /// Compliance between points of the surface whose near part is that of the elastic half-space (Boussinesq
 /// 1885, Cerruti 1882) and not the mesh's, which is stiffer the smaller the contact:
 ///
@@ -31,40 +24,37 @@ struct LocalParts {
 /// (docs/theory-contact.md). Const once made; any number of threads may use it.
 class LocalCompliance {
  public:
-  /// For a body in space with isotropic material; `body` is needed until this is made.
-  LocalCompliance(const ElasticBody& body, const LocalParts& parts);
+  /// For a body in space of Young's modulus E [Pa] and Poisson's ratio nu, whose own triangles are `mesh` [3
+  /// x number], surface nodes; `body` is needed until this is made.
+  LocalCompliance(const ElasticBody& body, std::span<const Index> mesh, double E, double nu);
   ~LocalCompliance();
   LocalCompliance(const LocalCompliance&) = delete;
   LocalCompliance& operator=(const LocalCompliance&) = delete;
 
   /// Xi - D.
   [[nodiscard]] const Greens& smooth() const noexcept { return *smooth_; }
-  /// B: displacement of a surface node by a force on another, or by one on itself [m/N].
-  [[nodiscard]] Mat3 between(Index node, Index loaded) const noexcept;
-
   /// A node of the surface at rest.
   struct Point {
     Vec3 x = Vec3::Zero(), normal = Vec3::Zero();
     Vec3 share = Vec3::Zero();  ///< of each axis that is free: 1, on held nodes 0
-    double c = 0.0;             ///< (1 + nu) / (pi E) [1/Pa]
-    double nu = 0.0;
-    double reach = 0.0;  ///< [m] four edges
-    double part = 1.0;   ///< of B and D that count: less near nodes that are held along some axes, 0 there
-    double disc = 0.0;   ///< radius of the disc as large as its part of the surface [m]
+    double reach = 0.0;         ///< [m] four edges
+    double part = 1.0;  ///< of B and D that count: less near nodes that are held along some axes, 0 there
+    double disc = 0.0;  ///< radius of the disc as large as its part of the surface [m]
   };
   [[nodiscard]] const Point& point(Index node) const noexcept {
     return points_[static_cast<std::size_t>(node)];
   }
-  /// B f [m] at a point by a force [N] on another.
-  [[nodiscard]] static Vec3 displacement(const Point& a, const Point& loaded, const Vec3& force) noexcept;
+  /// B: displacement of a point by a force on another, or by one on itself [m/N].
+  [[nodiscard]] Mat3 between(const Point& a, const Point& loaded) const noexcept;
   /// Within this distance B is not zero [m].
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
  private:
-  void measure(const ElasticBody& body, const LocalParts& parts);
-  void follow(const ElasticBody& body, const LocalParts& parts);
+  void measure(const ElasticBody& body);
+  void follow(const ElasticBody& body, std::span<const Index> mesh);
   void fade_at_planes(const ElasticBody& body, const std::vector<Vec3>& free);
 
+  double c_, nu_;              // (1 + nu) / (pi E) [1/Pa]
   std::vector<Point> points_;  // [S]
   double reach_ = 0.0;
   std::unique_ptr<const Greens> smooth_;

@@ -166,10 +166,10 @@ void NearField::add_local(const LocalCompliance& local, Index place) noexcept {
     Mat3 B = Mat3::Zero();
     if (is_group(other)) {
       for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
-        B += local.between(node(place), member) * map;
+        B += local.between(local.point(node(place)), local.point(member)) * map;
       });
     } else {
-      B = local.between(node(place), node(other));
+      B = local.between(local.point(node(place)), local.point(node(other)));
     }
     for (std::ptrdiff_t i = 0; i < d; ++i) {
       for (std::ptrdiff_t j = 0; j < d; ++j)

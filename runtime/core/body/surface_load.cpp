@@ -12,6 +12,11 @@ std::size_t dofs(int dimension, Index nodes) noexcept {
   return static_cast<std::size_t>(dimension) * static_cast<std::size_t>(nodes);
 }
 
+bool is_in_local_reach(const SurfaceLoad& load, Index node) noexcept {
+  return load.point_count > 0 && load.points_box.squaredExteriorDistance(load.local->point(node).x) <
+                                     load.local->reach() * load.local->reach();
+}
+
 }  // namespace
 
 SurfaceLoad::SurfaceLoad(const ElasticBody& body, Index near_nodes, Index stored_nodes, Index patch_nodes)
@@ -75,25 +80,20 @@ void SurfaceLoad::lump_points() noexcept {
   }
 }
 
-bool SurfaceLoad::is_in_local_reach(Index surface_node) const noexcept {
-  return point_count > 0 &&
-         points_box.squaredExteriorDistance(local->point(surface_node).x) < local->reach() * local->reach();
-}
-
 Vec3 SurfaceLoad::local_displacement(Index surface_node) const noexcept {
   Vec3 sum = Vec3::Zero();
-  if (!is_in_local_reach(surface_node)) return sum;
+  if (!is_in_local_reach(*this, surface_node)) return sum;
   for (std::size_t k = 0; k < static_cast<std::size_t>(point_count); ++k)
-    sum += LocalCompliance::displacement(local->point(surface_node), local->point(point[k]), point_force[k]);
+    sum += local->between(local->point(surface_node), local->point(point[k])) * point_force[k];
   return sum;
 }
 
 Vec3 SurfaceLoad::far_local_displacement(Index surface_node) const noexcept {
   Vec3 sum = Vec3::Zero();
-  if (!is_in_local_reach(surface_node)) return sum;
+  if (!is_in_local_reach(*this, surface_node)) return sum;
   for (std::size_t k = 0; k < lump.size(); ++k) {
     if (!lump_force[k].isZero(0.0))
-      sum += LocalCompliance::displacement(local->point(surface_node), lump[k], lump_force[k]);
+      sum += local->between(local->point(surface_node), lump[k]) * lump_force[k];
   }
   return sum;
 }

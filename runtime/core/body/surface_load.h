@@ -54,8 +54,6 @@ struct SurfaceLoad {
   /// of its smooth part.
   [[nodiscard]] const Greens& greens(const ElasticBody& body) const noexcept;
 
-  [[nodiscard]] bool is_in_local_reach(Index node) const noexcept;
-
   int dimension;  ///< d
   Index count = 0;
   std::vector<Index> node;

@@ -2,7 +2,7 @@
 #include <array>
 #include <utility>
 
-#include "runtime/core/body/greens.h"
+#include "runtime/core/body/greens_on_top.h"
 #include "runtime/core/solve/vector_loops.h"
 
 namespace palpate {
@@ -10,24 +10,14 @@ namespace {
 
 constexpr Index turned_forces = 128, turned_nodes = 64;  // of a part of a product
 
-class TurnedGreens final : public Greens {
+class TurnedGreens final : public GreensOnTop {
  public:
   TurnedGreens(std::shared_ptr<const Greens> greens, std::vector<Mat3> rotations, const Eigen::MatrixXd& left,
                const Eigen::MatrixXd& right)
-      : Greens(greens->dimension(), greens->nodes(), greens->precision()),
-        greens_(std::move(greens)),
-        rotations_(std::move(rotations)),
-        left_(left),
-        right_(right) {}
-
-  [[nodiscard]] const ExactTerms* exact_terms() const noexcept override { return greens_->exact_terms(); }
-  [[nodiscard]] bool unfolded() const noexcept override { return greens_->unfolded(); }
-  [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept override {
-    return greens_->compressed_form();
-  }
+      : GreensOnTop(std::move(greens)), rotations_(std::move(rotations)), left_(left), right_(right) {}
 
   void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
-    greens_->gather(row, columns, blocks);
+    below().gather(row, columns, blocks);
     const auto d = static_cast<Eigen::Index>(dimension());
     const auto width = d * std::ssize(columns);
     const Mat3& R = rotations_[static_cast<std::size_t>(row)];
@@ -75,8 +65,8 @@ class TurnedGreens final : public Greens {
                 R.transpose() * vector_at(f, dimension(), static_cast<Index>(begin + k));
             set_vector(turned_force, dimension(), static_cast<Index>(k), force);
           }
-          greens_->displacement(nodes.subspan(begin, count), {turned_force.data(), d * count}, {&part, 1},
-                                {moved.data(), dofs});
+          below().displacement(nodes.subspan(begin, count), {turned_force.data(), d * count}, {&part, 1},
+                               {moved.data(), dofs});
           for (std::size_t k = 0; k < dofs; ++k) out[k] += moved[k];
         }
         const std::span<double> slice(out, dofs);
@@ -95,7 +85,6 @@ class TurnedGreens final : public Greens {
  private:
   using Terms = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  std::shared_ptr<const Greens> greens_;
   std::vector<Mat3> rotations_;  // [nodes]
   Terms left_, right_;           // [n x terms]
 };

@@ -38,6 +38,9 @@ class Local : public testing::TestWithParam<ElementType> {
   [[nodiscard]] const Vec3& at(Index node) const {
     return body_.surface_rest_positions()[static_cast<std::size_t>(node)];
   }
+  [[nodiscard]] Mat3 between(Index node, Index loaded) const {
+    return local_.between(local_.point(node), local_.point(loaded));
+  }
   /// Surface nodes of the top (z = 1) within a distance of its middle.
   [[nodiscard]] std::vector<Index> on_top(double radius) const {
     std::vector<Index> found;
@@ -68,18 +71,15 @@ class Local : public testing::TestWithParam<ElementType> {
 INSTANTIATE_TEST_SUITE_P(Elements, Local, testing::Values(ElementType::tet4, ElementType::tet10),
                          [](const auto& tested) { return std::string(traits(tested.param).name); });
 
-TEST_P(Local, IsReciprocalAndTheSameByPairsAndByForces) {
+TEST_P(Local, IsReciprocal) {
   std::mt19937 random(3);
   std::uniform_int_distribution<Index> any(0, nodes_ - 1);
   int within = 0;
   for (int k = 0; k < 400; ++k) {
     const Index i = any(random), j = k % 10 == 0 ? i : any(random);
-    const Mat3 B = local_.between(i, j);
+    const Mat3 B = between(i, j);
     within += B.isZero(0.0) ? 0 : 1;
-    EXPECT_LE((B - local_.between(j, i).transpose()).cwiseAbs().maxCoeff(), 1e-14 * B.cwiseAbs().maxCoeff());
-    const Vec3 f(0.3, -1.1, 0.7);
-    EXPECT_LE((B * f - LocalCompliance::displacement(local_.point(i), local_.point(j), f)).norm(),
-              1e-13 * B.norm());
+    EXPECT_LE((B - between(j, i).transpose()).cwiseAbs().maxCoeff(), 1e-14 * B.cwiseAbs().maxCoeff());
   }
   EXPECT_GT(within, 50);
 }
@@ -93,7 +93,7 @@ TEST_P(Local, IsBoussinesqsBesideAForce) {
     const Vec3 x = at(node) - at(loaded);
     const double r = x.norm();
     if (r == 0.0) continue;
-    const Vec3 u = local_.between(node, loaded) * Vec3(0.0, 0.0, -1.0);
+    const Vec3 u = between(node, loaded) * Vec3(0.0, 0.0, -1.0);
     const double q = r / local_.point(node).reach, left = (1.0 - q * q) * (1.0 - q * q);
     EXPECT_NEAR(u.z(), -left * (1.0 - nu * nu) / (std::numbers::pi * E * r), 1e-9 / r);
     EXPECT_NEAR(u.dot(x) / r, -left * (1.0 + nu) * (1.0 - 2.0 * nu) / (2.0 * std::numbers::pi * E * r),
@@ -181,8 +181,8 @@ TEST_P(Local, MovesPicturesAsTicks) {
 TEST_P(Local, HoldsWhatIsHeld) {
   for (Index node = 0; node < nodes_; ++node) {
     if (body_.surface_moves(node)) continue;
-    EXPECT_TRUE(local_.between(node, node).isZero(0.0));
-    EXPECT_TRUE(local_.between(node, (node + 1) % nodes_).isZero(0.0));
+    EXPECT_TRUE(between(node, node).isZero(0.0));
+    EXPECT_TRUE(between(node, (node + 1) % nodes_).isZero(0.0));
   }
 }
 
