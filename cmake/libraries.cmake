@@ -119,7 +119,7 @@ target_compile_options(palpate_shell_options INTERFACE "$<$<CONFIG:Release>:-O1>
 # that were checked at load, no text and no bytes from outside, so that stack and sizes are watched around them and not in them. To be linked
 # last, as the last flag counts.
 add_library(palpate_kernel_options INTERFACE)
-target_compile_options(palpate_kernel_options INTERFACE -fopenmp-simd "$<$<NOT:$<CONFIG:Debug>>:-O3;-ffp-contract=fast>" ${PALPATE_UNWATCHED})
+target_compile_options(palpate_kernel_options INTERFACE -fopenmp-simd -fno-math-errno "$<$<NOT:$<CONFIG:Debug>>:-O3;-ffp-contract=fast>" ${PALPATE_UNWATCHED})
 if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
   target_compile_options(palpate_kernel_options INTERFACE -Wno-pass-failed)  # with sanitizers some loops stay as they are
 endif()

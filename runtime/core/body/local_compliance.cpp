@@ -333,4 +333,65 @@ Mat3 LocalCompliance::between(const Point& a, const Point& b) const noexcept {
   return part * left * share * along_free_axes(half_space(a, b, nu_), a, b);
 }
 
+void LocalCompliance::add_row(const Point& a, const LocalPoints& loaded, Index count,
+                              double* rows) const noexcept {
+  // The formulas of `between`, written out for the vector units.
+  const double *bx = loaded[0], *by = loaded[1], *bz = loaded[2], *bu = loaded[3], *bv = loaded[4],
+               *bw = loaded[5], *share_x = loaded[6], *share_y = loaded[7], *share_z = loaded[8],
+               *reach = loaded[9], *disc = loaded[10];
+  const Vec3 x = a.x, m = a.normal, of_a = c_ * a.part * a.share;
+  const double nu = nu_, of_reach = a.reach;
+  double *row_x = rows, *row_y = rows + std::ptrdiff_t{3} * count, *row_z = rows + std::ptrdiff_t{6} * count;
+#pragma omp simd
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
+    const double dx = x[0] - bx[k], dy = x[1] - by[k], dz = x[2] - bz[k];
+    const double r2 = dx * dx + dy * dy + dz * dz;
+    const double cosine = m[0] * bu[k] + m[1] * bv[k] + m[2] * bw[k];
+    const double sides = 0.5 * (1.0 + cosine);
+    const double of_n = 0.5 / std::sqrt(std::max(sides, least_share));
+    const double nx = of_n * (m[0] + bu[k]), ny = of_n * (m[1] + bv[k]), nz = of_n * (m[2] + bw[k]);
+    const bool is_own = r2 == 0.0;
+    const double of_r = is_own ? of_lattice / disc[k] : 1.0 / std::sqrt(r2);
+    const double all = of_reach + reach[k];
+    const double left = std::max(0.0, 1.0 - 4.0 * r2 / (all * all));
+    const double on_both = sides < least_share ? 0.0 : sides * left * left;
+    const double factor = of_r * (is_own ? 1.0 : on_both);
+    const double along = dx * nx + dy * ny + dz * nz;
+    const double qx = is_own ? m[0] : of_r * (dx - along * nx), qy = is_own ? m[1] : of_r * (dy - along * ny),
+                 qz = is_own ? m[2] : of_r * (dz - along * nz);
+    const double even = factor * (is_own ? 1.0 - 0.5 * nu : 1.0 - nu),
+                 by_q = factor * (is_own ? -0.5 * nu : nu),
+                 turned = is_own ? 0.0 : factor * 0.5 * (1.0 - 2.0 * nu);
+    const double xy = by_q * qx * qy, xz = by_q * qx * qz, yz = by_q * qy * qz;
+    const double turned_xy = turned * (qx * ny - nx * qy), turned_xz = turned * (qx * nz - nx * qz),
+                 turned_yz = turned * (qy * nz - ny * qz);
+    row_x[3 * k] += of_a[0] * share_x[k] * (even + by_q * qx * qx);
+    row_x[3 * k + 1] += of_a[0] * share_y[k] * (xy + turned_xy);
+    row_x[3 * k + 2] += of_a[0] * share_z[k] * (xz + turned_xz);
+    row_y[3 * k] += of_a[1] * share_x[k] * (xy - turned_xy);
+    row_y[3 * k + 1] += of_a[1] * share_y[k] * (even + by_q * qy * qy);
+    row_y[3 * k + 2] += of_a[1] * share_z[k] * (yz + turned_yz);
+    row_z[3 * k] += of_a[2] * share_x[k] * (xz - turned_xz);
+    row_z[3 * k + 1] += of_a[2] * share_y[k] * (yz - turned_yz);
+    row_z[3 * k + 2] += of_a[2] * share_z[k] * (even + by_q * qz * qz);
+  }
+}
+
+void LocalPoints::set(Index place, const LocalCompliance::Point& point) noexcept {
+  double* to = of_.data() + place;
+  for (const Vec3& of_axes : {point.x, point.normal, Vec3(point.part * point.share)}) {
+    for (const double component : of_axes) {
+      *to = component;
+      to += room_;
+    }
+  }
+  to[0] = point.reach;
+  to[room_] = point.disc;
+}
+
+void LocalPoints::move(Index from, Index to) noexcept {
+  for (Index component = 0; component < components; ++component)
+    of_[at(component * room_ + to)] = of_[at(component * room_ + from)];
+}
+
 }  // namespace palpate

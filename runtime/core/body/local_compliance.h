@@ -12,6 +12,7 @@
 namespace palpate {
 
 class ElasticBody;
+class LocalPoints;
 
 /// Compliance between points of the surface whose near part is that of the elastic half-space (Boussinesq
 /// 1885, Cerruti 1882) and not the mesh's, which is stiffer the smaller the contact:
@@ -46,6 +47,8 @@ class LocalCompliance {
   }
   /// B: displacement of a point by a force on another, or by one on itself [m/N].
   [[nodiscard]] Mat3 between(const Point& a, const Point& loaded) const noexcept;
+  /// Adds the same to the three rows [3 x 3 count] of a point, for forces on each of the first points.
+  void add_row(const Point& a, const LocalPoints& loaded, Index count, double* rows) const noexcept;
   /// Within this distance B is not zero [m].
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
@@ -58,6 +61,25 @@ class LocalCompliance {
   std::vector<Point> points_;  // [S]
   double reach_ = 0.0;
   std::unique_ptr<const Greens> smooth_;
+};
+
+/// Points by their components, for loops over all of them.
+class LocalPoints {
+ public:
+  static constexpr Index components = 11;  ///< x, normal, share times part, reach, disc
+
+  explicit LocalPoints(Index room) : room_(room), of_(static_cast<std::size_t>(components * room)) {}
+
+  void set(Index place, const LocalCompliance::Point& point) noexcept;
+  void move(Index from, Index to) noexcept;
+  /// One component of all points.
+  [[nodiscard]] const double* operator[](Index component) const noexcept {
+    return of_.data() + std::ptrdiff_t{component} * room_;
+  }
+
+ private:
+  Index room_;
+  std::vector<double> of_;
 };
 
 }  // namespace palpate

@@ -35,6 +35,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
       members_{std::vector<Index>(at(capacity)), std::vector<Index>(at(most_members_ * capacity)),
                std::vector<double>(at(most_members_ * capacity)),
                std::vector<Eigen::Matrix3d>(at(most_members_ * capacity))},
+      local_points_(body.local() != nullptr ? capacity : 0),
       load_(body, std::max<Index>(most_members_, 1) * capacity, followed_.room(), patch_nodes) {
   beside_.room = patch_nodes;
   beside_.stride = (static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8;
@@ -70,9 +71,11 @@ void NearField::begin_tick() noexcept {
     last_motion_[dof] = displacement_[dof] - begun_[dof];
     begun_[dof] = displacement_[dof];
   }
+  const bool is_fine = load_.local != nullptr;
   const std::int64_t patience =
-      tuning.body.patience * tuning.body.usual_nodes / std::max(count_, tuning.body.usual_nodes);
-  for (int k = 0; k < 2; ++k) {
+      is_fine ? tuning.body.fine_patience
+              : tuning.body.patience * tuning.body.usual_nodes / std::max(count_, tuning.body.usual_nodes);
+  for (int k = 0; k < (is_fine ? tuning.body.most_forgotten : 2); ++k) {
     const Index place = longest_unwanted();
     if (place < 0 || wanted_[place] + patience >= tick_) return;
     forget(place);
@@ -139,6 +142,8 @@ void NearField::add(const ElasticBody& body, Index surface_node) noexcept {
 /// follows and the response of the patch to it.
 void NearField::enter(const ElasticBody& body, Index place) noexcept {
   std::fill_n(offset_.begin() + std::ptrdiff_t{dimension_} * place, dimension_, 0.0);
+  if (load_.local != nullptr)
+    local_points_.set(place, is_group(place) ? LocalCompliance::Point{} : load_.local->point(node(place)));
   if (is_group(place)) {
     for_each_member(place,
                     [&](Index member, double, const Eigen::Matrix3d&) { follow(body, place, member); });
@@ -186,7 +191,7 @@ void NearField::forget(Index place) noexcept {
   }
   for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
     double* row = C_.data() + dof * stride_;
-    std::copy_n(row + d * last, d, row + d * place);
+    for (std::ptrdiff_t axis = 0; axis < d; ++axis) row[d * place + axis] = row[d * last + axis];
   }
   move(last, place);
   if (patch() == nullptr) return;
@@ -203,6 +208,7 @@ void NearField::move(Index from, Index to) noexcept {
   nodes_[at(to)] = nodes_[at(from)];
   wanted_[at(to)] = wanted_[at(from)];
   followed_.move(from, to);
+  if (load_.local != nullptr) local_points_.move(from, to);
   if (is_group(from)) {
     const auto move_members = [&](auto& of_members) {
       std::copy_n(of_members.begin() + std::ptrdiff_t{most_members_} * from, members_.count[at(from)],
@@ -284,6 +290,12 @@ void NearField::retreat(double share) noexcept {
   const Index dofs = dimension_ * count_;
   for (std::size_t dof = 0; dof < static_cast<std::size_t>(dofs); ++dof)
     force_[dof] = last_force_[dof] + share * (force_[dof] - last_force_[dof]);
+  double largest = 0.0;
+  for (Index place = 0; place < count_; ++place) largest = std::max(largest, force(place).norm());
+  for (Index place = 0; place < count_; ++place) {
+    if (wanted_[at(place)] != tick_ && force(place).norm() < tuning.passes.left_behind * largest)
+      std::fill_n(force_.begin() + std::ptrdiff_t{dimension_} * place, dimension_, 0.0);
+  }
 }
 
 void NearField::load(Index place, const Vec3& force) noexcept {

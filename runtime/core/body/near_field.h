@@ -197,6 +197,7 @@ class NearField {
   Members members_;
   BesidePatch beside_;
   Work work_;
+  LocalPoints local_points_;  // [capacity] with no shares for groups
   SurfaceLoad load_;
 };
 

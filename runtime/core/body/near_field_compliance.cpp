@@ -1,10 +1,38 @@
 // C of a near field's nodes, from the Green's functions and from the patch.
 #include <algorithm>
+#include <array>
 
 #include "runtime/core/body/near_field.h"
 #include "runtime/core/solve/vector_loops.h"
 
 namespace palpate {
+namespace {
+
+/// Sets entry (i, j) of a block in d rows to value(i, j).
+template <class Value>
+void set_entries(Index d, double* block, std::ptrdiff_t row, const Value& value) noexcept {
+  for (Index i = 0; i < d; ++i) {
+    for (Index j = 0; j < d; ++j) block[i * row + j] = value(i, j);
+  }
+}
+
+/// Sets a block to the weighted sum of those of the stored nodes that its node follows.
+template <Index D>
+void sum_of_parts(std::span<const FollowedNodes::Part> parts, const double* by_followed, std::ptrdiff_t width,
+                  double* block, std::ptrdiff_t row) noexcept {
+  std::array<double, std::size_t{D} * D> sum{};
+  for (const FollowedNodes::Part& part : parts) {
+    const double* by = by_followed + std::ptrdiff_t{D} * part.number;
+    for (std::size_t i = 0; i < D; ++i) {
+      for (std::size_t j = 0; j < D; ++j)
+        sum[D * i + j] +=
+            part.weight * by[static_cast<std::ptrdiff_t>(i) * width + static_cast<std::ptrdiff_t>(j)];
+    }
+  }
+  set_entries(D, block, row, [&](Index i, Index j) { return sum[static_cast<std::size_t>(D * i + j)]; });
+}
+
+}  // namespace
 
 /// Computes X = Xi_Q for forces on the node, and Y = M X.
 void NearField::respond(const ElasticBody& body, Index place) noexcept {
@@ -134,46 +162,41 @@ void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexc
                               {work_.gathered.data(), static_cast<std::size_t>(d * width)});
     palpate::add(work_.gathered.data(), part.weight, work_.by_followed.data(), d * width);
   }
-  double* block = work_.blocks.data();
-  for (Index i = 0; i < d; ++i) {
-    const double* by = work_.by_followed.data() + i * width;
-    for (Index other = 0; other <= place; ++other) {
-      if (is_group(other)) {
-        connect_to_group(other, by, block);
-        block += d;
-        continue;
-      }
-      for (Index j = 0; j < d; ++j) {
-        double sum = 0.0;
-        if (patch_place(other) >= 0) {
-          sum = dot(Y(d * other + j), X(d * place + i), patch_dofs());
-        } else {
-          for (const FollowedNodes::Part& part : followed_.parts(other))
-            sum += part.weight * by[d * part.number + j];
-          if (patch() != nullptr) sum += dot(X(d * other + j), Y(d * place + i), patch_dofs());
-        }
-        *block++ = sum;
-      }
+  for (Index other = 0; other <= place; ++other) {
+    double* block = work_.blocks.data() + std::ptrdiff_t{d} * other;
+    const std::ptrdiff_t row = std::ptrdiff_t{d} * (place + 1);
+    if (is_group(other)) {
+      for (Index i = 0; i < d; ++i)
+        connect_to_group(other, work_.by_followed.data() + i * width, block + i * row);
+    } else if (patch_place(other) >= 0) {
+      set_entries(d, block, row,
+                  [&](Index i, Index j) { return dot(Y(d * other + j), X(d * place + i), patch_dofs()); });
+    } else if (d == 3) {
+      sum_of_parts<3>(followed_.parts(other), work_.by_followed.data(), width, block, row);
+    } else {
+      sum_of_parts<2>(followed_.parts(other), work_.by_followed.data(), width, block, row);
     }
+    if (patch() == nullptr || is_group(other) || patch_place(other) >= 0) continue;
+    set_entries(d, block, row, [&](Index i, Index j) {
+      return block[i * row + j] + dot(X(d * other + j), Y(d * place + i), patch_dofs());
+    });
   }
   if (load_.local_now() != nullptr) add_local(*load_.local_now(), place);
 }
 
 /// Adds the local compliance between a node and those before it.
 void NearField::add_local(const LocalCompliance& local, Index place) noexcept {
-  const std::ptrdiff_t d = dimension_, width = d * (place + 1);
-  for (Index other = 0; other <= place; ++other) {
+  const std::ptrdiff_t width = std::ptrdiff_t{3} * (place + 1);
+  local.add_row(local.point(node(place)), local_points_, place + 1, work_.blocks.data());
+  for (Index other = 0; other < place; ++other) {
+    if (!is_group(other)) continue;
     Mat3 B = Mat3::Zero();
-    if (is_group(other)) {
-      for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
-        B += local.between(local.point(node(place)), local.point(member)) * map;
-      });
-    } else {
-      B = local.between(local.point(node(place)), local.point(node(other)));
-    }
-    for (std::ptrdiff_t i = 0; i < d; ++i) {
-      for (std::ptrdiff_t j = 0; j < d; ++j)
-        work_.blocks[at(static_cast<Index>(i * width + d * other + j))] += B(i, j);
+    for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
+      B += local.between(local.point(node(place)), local.point(member)) * map;
+    });
+    for (std::ptrdiff_t i = 0; i < 3; ++i) {
+      for (std::ptrdiff_t j = 0; j < 3; ++j)
+        work_.blocks[at(static_cast<Index>(i * width + std::ptrdiff_t{3} * other + j))] += B(i, j);
     }
   }
 }

@@ -39,10 +39,9 @@ void ContactSolver::derivative(const ContactProblem& problem, int changes, std::
     cone_solver_.derivative(problem, db.subspan(s * rows), dlambda.subspan(s * rows));
 }
 
-bool ContactSolver::was_easy(const ContactProblem& problem) const noexcept {
-  if (method_ == Method::newton_krylov)
-    return problem.rows <= tuning.passes.most_rows && newton_krylov_.was_easy();
-  return method_ == Method::active_set || (cone_solver_.was_easy() && !was_improved_);
+bool ContactSolver::was_easy() const noexcept {
+  return method_ == Method::active_set ||
+         (method_ == Method::cone_solver && cone_solver_.was_easy() && !was_improved_);
 }
 
 double ContactSolver::rounding() const noexcept {

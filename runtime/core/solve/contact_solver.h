@@ -36,7 +36,7 @@ class ContactSolver {
                   std::span<double> dlambda) noexcept;
 
   /// True if the last `solve` left time for another.
-  [[nodiscard]] bool was_easy(const ContactProblem& problem) const noexcept;
+  [[nodiscard]] bool was_easy() const noexcept;
   /// Change of forces by rounding alone [largest force]; 0: the method is exact.
   [[nodiscard]] double rounding() const noexcept;
   /// r [rows] that the last `solve` left at contacts that stick [m]; empty where that is next to nothing.

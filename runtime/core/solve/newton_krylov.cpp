@@ -65,10 +65,6 @@ NewtonKrylov::NewtonKrylov(Index max_contacts, Index max_rows)
       improved_(static_cast<std::size_t>(improved_stride_ * improved_stride_)),
       reduced_(max_contacts, padded(max_rows)) {}
 
-bool NewtonKrylov::was_easy() const noexcept {
-  return work_ <= tuning.many.easy_share * tuning.many.most_work;
-}
-
 void NewtonKrylov::count_products(int products) noexcept {
   products_ += products;
   work_ += products * product_work(W_.rows);

@@ -48,8 +48,6 @@ class NewtonKrylov {
   [[nodiscard]] double residual() const noexcept {
     return residual_;
   }  ///< residual of the last `solve` [largest force]
-  /// True if `solve` left time for another pass.
-  [[nodiscard]] bool was_easy() const noexcept;
   /// r [rows] at the end of the last `solve` [m].
   [[nodiscard]] std::span<const float> motion() const noexcept { return r_; }
 

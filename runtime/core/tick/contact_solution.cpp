@@ -83,7 +83,7 @@ bool is_rough(const ElasticBody& body, const State& state) noexcept {
 
 /// True if another pass would be fast, and the body is not released, after which it vibrates.
 bool may_repeat(const ElasticBody& body, const State& state, const Scratch& scratch) noexcept {
-  return scratch.solver.was_easy(scratch.problem) && !is_released(body, state);
+  return scratch.solver.was_easy() && !is_released(body, state);
 }
 
 /// Switches to the requested patch. The old one is kept if the capacity is exceeded.

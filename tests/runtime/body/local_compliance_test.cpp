@@ -86,6 +86,27 @@ TEST_P(Local, IsReciprocal) {
 
 // Boussinesq's point force: normal displacement (1 - nu^2) / (pi E r), and towards the force (1 + nu)(1 - 2
 // nu) / (2 pi E r).
+TEST_P(Local, RowsAreThoseOfPairs) {
+  const auto count = std::min<Index>(nodes_, 400);
+  LocalPoints points(count);
+  for (Index node = 0; node < count; ++node) points.set(count - 1 - node, local_.point(node));
+  for (Index node = 0; node < count / 2; ++node) {  // in their order, each moved once
+    LocalPoints one(2);
+    one.set(0, local_.point(node));
+    one.move(0, 1);
+    for (Index k = 0; k < LocalPoints::components; ++k) ASSERT_EQ(one[k][1], points[k][count - 1 - node]);
+  }
+  MatrixXd rows(3 * count, 3);  // columns are the three rows
+  for (const Index node : {Index{0}, count / 2, count - 1}) {
+    rows.setConstant(1.0);
+    local_.add_row(local_.point(node), points, count, rows.data());
+    for (Index other = 0; other < count; ++other) {
+      const Mat3 wanted = between(node, other), B = rows.middleRows(3 * (count - 1 - other), 3).transpose();
+      ASSERT_LT((B.array() - 1.0 - wanted.array()).matrix().norm(), 1e-13 * (1.0 + wanted.norm()));
+    }
+  }
+}
+
 TEST_P(Local, IsBoussinesqsBesideAForce) {
   const std::vector<Index> top = on_top(0.2);
   const Index loaded = top.front();

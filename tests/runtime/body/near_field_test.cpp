@@ -155,6 +155,24 @@ TEST_P(NearFieldTest, RetreatMakesAShareOfTheChange) {
     EXPECT_LT((between[k] - (0.75 * before[k] + 0.25 * after[k])).norm(), 1e-14 * after[k].norm());
 }
 
+// Where change after change is scaled down, what a tool has left behind would be loaded for ever.
+TEST_P(NearFieldTest, RetreatLeavesNothingSmallBehind) {
+  NearField near(body_, 20);
+  const std::vector<Index> nodes = free_nodes(5);
+  const auto at = [&](std::size_t k) { return near.place_of(nodes[k]); };
+  near.begin_tick();
+  for (std::size_t k = 0; k < 3; ++k) near.want(body_, nodes[k]);
+  near.load(at(0), test::upright(GetParam(), 0.0, 0.0, 0.5));
+  near.load(at(1), test::upright(GetParam(), 0.0, 0.0, 2.0));
+  near.begin_tick();
+  for (std::size_t k = 1; k < 3; ++k) near.want(body_, nodes[k]);
+  near.unload();
+  near.load(at(2), test::upright(GetParam(), 0.0, 0.0, 1.0));
+  near.retreat(0.999);
+  EXPECT_EQ(near.force(at(0)), Vec3::Zero());
+  EXPECT_GT(near.force(at(1)).norm(), 0.0);
+}
+
 /// A group of nodes with weights and maps, two of its nodes left out.
 struct Group {
   Group(const Body& body, Index group, unsigned seed)
