@@ -138,8 +138,9 @@ class FieldOfLeaves {
     if (tree.begin(c) >= end_ || tree.end(c) <= first_) return;
     Terms& terms = motion_[at(level)];
     if (moved) {
-      multiply(walk_.transfer(c), walk_.rank(c), walk_.rank(ClusterTree::parent(c)),
-               motion_[at(level - 1)].data(), terms.data());
+      for_each_product<1>(walk_.transfer(c), walk_.rank(c), walk_.rank(ClusterTree::parent(c)),
+                          {motion_[at(level - 1)].data()},
+                          [&](Index term, const std::array<double, 1>& sum) { terms[at(term)] = sum[0]; });
     } else {
       std::fill_n(terms.begin(), walk_.rank(c), 0.0);
     }
@@ -168,9 +169,8 @@ class FieldOfLeaves {
     double* u = to_ + std::int64_t{D} * (from - first_);
     for (Index node = from; node < to; ++node) {
       const float* V = walk_.basis(leaf, std::int64_t{D} * (node - walk_.matrix.tree.begin(leaf)));
-      std::array<const float*, D> rows;
-      for (int axis = 0; axis < D; ++axis) rows[at(axis)] = V + std::int64_t{axis} * rank;
-      for (const double by_terms : dots<D>(rows, terms.data(), rank)) *u++ += by_terms;
+      const auto by_terms = products<D, 1>(rows_from<D>(V, rank), {terms.data()}, rank);
+      for (std::size_t axis = 0; axis < D; ++axis) *u++ += by_terms[0][axis];
     }
   }
 

@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 using namespace nested;
 
-constexpr std::size_t columns_at_once = 256;  // of a row, sorted by leaves
+constexpr std::size_t columns_at_once = 1024;  // of a row, sorted by leaves
 
 /// A block row, evaluated one leaf of columns at a time.
 template <int D>
@@ -51,11 +51,10 @@ class BlockRow {
       return;
     }
     const Index rank = walk_.rank(leaf);
-    const std::array<const float*, D> V = rows(walk_.basis(leaf, in_leaf), rank);
-    for (int i = 0; i < D; ++i) {
-      const std::array<double, D> entries = dots<D>(V, down_[at(walk_.levels())].terms[at(i)].data(), rank);
-      for (int j = 0; j < D; ++j) block[i * stride + j] = m.scale * entries[at(j)];
-    }
+    const auto entries =
+        products(rows_from<D>(walk_.basis(leaf, in_leaf), rank), terms(down_[at(walk_.levels())]), rank);
+    for (int i = 0; i < D; ++i)
+      for (int j = 0; j < D; ++j) block[i * stride + j] = m.scale * entries[at(i)][at(j)];
   }
 
  private:
@@ -65,10 +64,10 @@ class BlockRow {
     std::array<Terms, D> terms;
   };
 
-  [[nodiscard]] static std::array<const float*, D> rows(const float* first, Index stride) noexcept {
-    std::array<const float*, D> all;
-    for (int k = 0; k < D; ++k) all[at(k)] = first + std::int64_t{k} * stride;
-    return all;
+  [[nodiscard]] static std::array<const double*, D> terms(const Down& down) noexcept {
+    std::array<const double*, D> of_axes;
+    for (std::size_t axis = 0; axis < D; ++axis) of_axes[axis] = down.terms[axis].data();
+    return of_axes;
   }
 
   /// Computes the terms of a far leaf, from the lowest cluster that is also above the leaf before.
@@ -120,9 +119,10 @@ class BlockRow {
     const Index parent = ClusterTree::parent(c);
     Down& to = down_[at(level)];
     to.cluster = c;
-    for (int axis = 0; axis < D; ++axis)
-      multiply(walk_.transfer(c), walk_.rank(c), walk_.rank(parent),
-               down_[at(level - 1)].terms[at(axis)].data(), to.terms[at(axis)].data());
+    for_each_product<D>(walk_.transfer(c), walk_.rank(c), walk_.rank(parent), terms(down_[at(level - 1)]),
+                        [&](Index term, const std::array<double, D>& sums) {
+                          for (std::size_t axis = 0; axis < D; ++axis) to.terms[axis][at(term)] = sums[axis];
+                        });
     if (level < walk_.levels()) down_[at(level + 1)].cluster = -1;
   }
 

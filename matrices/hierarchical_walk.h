@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,11 +23,50 @@ inline std::size_t at(std::int64_t i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-inline double dot(const float* a, const double* b, Index count) noexcept {
-  double sum = 0.0;
-#pragma omp simd reduction(+ : sum)
-  for (Index k = 0; k < count; ++k) sum += static_cast<double>(a[k]) * b[k];
-  return sum;
+inline constexpr Index lanes = 8;
+using Lanes = double __attribute__((vector_size(lanes * sizeof(double))));
+using FloatLanes = float __attribute__((vector_size(lanes * sizeof(float))));
+
+/// Products of R rows A_r with C vectors, [C][R], side by side: each number is read once. The order of the
+/// sums depends on the count alone, not on the processor. (`omp simd` would leave long chains of additions.)
+template <std::size_t R, std::size_t C>
+std::array<std::array<double, R>, C> products(const std::array<const float*, R>& A,
+                                              const std::array<const double*, C>& from,
+                                              Index count) noexcept {
+  Lanes sums[C][R] = {};  // NOLINT(*-avoid-c-arrays): stay in registers
+  const auto add_lanes = [&](Index k, const Lanes& share) {
+    Lanes a[R];  // NOLINT(*-avoid-c-arrays)
+    for (std::size_t r = 0; r < R; ++r) {
+      FloatLanes of_row;
+      std::memcpy(&of_row, A[r] + k, sizeof of_row);
+      a[r] = __builtin_convertvector(of_row, Lanes);
+    }
+    for (std::size_t c = 0; c < C; ++c) {
+      Lanes b;
+      std::memcpy(&b, from[c] + k, sizeof b);
+      b *= share;
+      for (std::size_t r = 0; r < R; ++r) sums[c][r] += a[r] * b;
+    }
+  };
+  Index k = 0;
+  for (; k + lanes <= count; k += lanes) add_lanes(k, Lanes{1, 1, 1, 1, 1, 1, 1, 1});
+  if (k < count && count >= lanes) {  // the last ones once more, without those that were added
+    static constexpr std::array<double, std::size_t{2}* lanes> shares = {0, 0, 0, 0, 0, 0, 0, 0,
+                                                                         1, 1, 1, 1, 1, 1, 1, 1};
+    Lanes share;
+    std::memcpy(&share, shares.data() + (count - k), sizeof share);
+    add_lanes(count - lanes, share);
+    k = count;
+  }
+  std::array<std::array<double, R>, C> all;
+  for (std::size_t c = 0; c < C; ++c) {
+    for (std::size_t r = 0; r < R; ++r) {
+      const Lanes& s = sums[c][r];
+      all[c][r] = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+      for (Index rest = k; rest < count; ++rest) all[c][r] += static_cast<double>(A[r][rest]) * from[c][rest];
+    }
+  }
+  return all;
 }
 
 inline void add(const float* a, double factor, double* sum, Index count) noexcept {
@@ -33,36 +74,31 @@ inline void add(const float* a, double factor, double* sum, Index count) noexcep
   for (Index k = 0; k < count; ++k) sum[k] += factor * static_cast<double>(a[k]);
 }
 
-/// Products of R rows A_p with `from`, computed side by side.
+/// R rows, one after the other.
 template <std::size_t R>
-std::array<double, R> dots(const std::array<const float*, R>& A, const double* from, Index count) noexcept {
-  std::array<double, R> sum{};
-  if constexpr (R == 2) {
-    double s0 = 0.0, s1 = 0.0;
-    const float *a0 = A[0], *a1 = A[1];
-#pragma omp simd reduction(+ : s0, s1)
-    for (Index k = 0; k < count; ++k) {
-      s0 += static_cast<double>(a0[k]) * from[k];
-      s1 += static_cast<double>(a1[k]) * from[k];
-    }
-    sum = {s0, s1};
-  } else {
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0;
-    const float *a0 = A[0], *a1 = A[1], *a2 = A[2];
-#pragma omp simd reduction(+ : s0, s1, s2)
-    for (Index k = 0; k < count; ++k) {
-      s0 += static_cast<double>(a0[k]) * from[k];
-      s1 += static_cast<double>(a1[k]) * from[k];
-      s2 += static_cast<double>(a2[k]) * from[k];
-    }
-    sum = {s0, s1, s2};
-  }
-  return sum;
+std::array<const float*, R> rows_from(const float* first, Index columns) noexcept {
+  std::array<const float*, R> all;
+  for (std::size_t r = 0; r < R; ++r) all[r] = first + static_cast<std::ptrdiff_t>(r) * columns;
+  return all;
 }
 
-/// to = A from, A [rows x columns] by rows.
-inline void multiply(const float* A, Index rows, Index columns, const double* from, double* to) noexcept {
-  for (Index i = 0; i < rows; ++i) to[i] = dot(A + std::int64_t{i} * columns, from, columns);
+/// Calls visit(row, its products with C vectors) for A [rows x columns] by rows.
+template <std::size_t C, class Visit>
+void for_each_product(const float* A, Index rows, Index columns, const std::array<const double*, C>& from,
+                      const Visit& visit) noexcept {
+  constexpr Index side_by_side = C == 1 ? 4 : 3;  // as many sums as there are registers for
+  const auto visit_some = [&]<std::size_t R>(std::integral_constant<std::size_t, R>, Index i) {
+    const auto sums = products(rows_from<R>(A + std::int64_t{i} * columns, columns), from, columns);
+    for (std::size_t r = 0; r < R; ++r) {
+      std::array<double, C> of_row;
+      for (std::size_t c = 0; c < C; ++c) of_row[c] = sums[c][r];
+      visit(i + static_cast<Index>(r), of_row);
+    }
+  };
+  Index i = 0;
+  for (; i + side_by_side <= rows; i += side_by_side)
+    visit_some(std::integral_constant<std::size_t, side_by_side>{}, i);
+  for (; i < rows; ++i) visit_some(std::integral_constant<std::size_t, 1>{}, i);
 }
 
 /// to += A^T from, A [rows x columns] by rows.
@@ -110,7 +146,8 @@ struct Walk {
   void couple(Index pair, Index a, Index b, const double* from, double* to) const noexcept {
     const float* S = matrix.coupling.get() + matrix.coupling_at[at(pair)];
     if (a > b) {
-      for (Index i = 0; i < rank(a); ++i) to[i] += dot(S + std::int64_t{i} * rank(b), from, rank(b));
+      for_each_product<1>(S, rank(a), rank(b), {from},
+                          [&](Index i, const std::array<double, 1>& sum) { to[i] += sum[0]; });
     } else {
       add_transposed(S, rank(b), rank(a), from, to);
     }

@@ -67,6 +67,7 @@ Index NearField::longest_unwanted() const noexcept {
 
 void NearField::begin_tick() noexcept {
   ++tick_;
+  added_blocks_ = 0;
   for (std::size_t dof = 0; dof < at(dimension_ * count_); ++dof) {
     last_motion_[dof] = displacement_[dof] - begun_[dof];
     begun_[dof] = displacement_[dof];
@@ -125,6 +126,7 @@ bool NearField::want_group(const ElasticBody& body, Index group, std::span<const
 
 void NearField::add(const ElasticBody& body, Index surface_node) noexcept {
   const Index place = count_++;
+  added_blocks_ += count_;
   place_[at(surface_node)] = place;
   nodes_[at(place)] = surface_node;
   enter(body, place);

@@ -111,6 +111,8 @@ class NearField {
   [[nodiscard]] Vec3 offset(Index place) const noexcept;
   /// Change of the displacement at a place in the last tick [m]; zero if it was not here.
   [[nodiscard]] Vec3 last_motion(Index place) const noexcept;
+  /// Blocks of C that the nodes added in this tick have needed, one for each node that was here.
+  [[nodiscard]] Index added_blocks() const noexcept { return added_blocks_; }
   /// Load of the last `displace`.
   [[nodiscard]] const SurfaceLoad& load() const noexcept { return load_; }
 
@@ -183,6 +185,7 @@ class NearField {
   std::ptrdiff_t stride_;
   std::int64_t tick_ = 0;
   std::int64_t revision_ = 0;
+  Index added_blocks_ = 0;
   std::vector<Index> place_;          // [S + groups]
   std::vector<Index> nodes_;          // [capacity] surface nodes
   std::vector<std::int64_t> wanted_;  // [capacity] last tick in which each was wanted

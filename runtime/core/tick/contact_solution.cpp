@@ -81,9 +81,10 @@ bool is_rough(const ElasticBody& body, const State& state) noexcept {
   return penetration(state) > most * body.mean_surface_edge();
 }
 
-/// True if another pass would be fast, and the body is not released, after which it vibrates.
+/// True if there is time for another pass, and the body is not released, after which it vibrates.
 bool may_repeat(const ElasticBody& body, const State& state, const Scratch& scratch) noexcept {
-  return scratch.solver.was_easy() && !is_released(body, state);
+  return scratch.solver.was_easy() && state.surface.near.added_blocks() <= tuning.passes.most_blocks &&
+         !is_released(body, state);
 }
 
 /// Switches to the requested patch. The old one is kept if the capacity is exceeded.

@@ -306,31 +306,40 @@ TEST_P(ManyContacts, ForeseeTheirForces) {
   EXPECT_LT(*median, 0.5);
 }
 
-/// Whether a tick in which a sphere slides far and deeper has many contacts, and whether it made more than
-/// one pass: then the last one began with other contact points than the tick.
-std::pair<bool, bool> slide_far(double radius, double friction) {
+/// A tick in which a sphere slides and goes deeper.
+struct Slide {
+  bool has_many_contacts;
+  Index blocks;
+  bool repeats;  ///< the last pass began with other contact points than the tick
+};
+
+Slide slide(double radius, double friction, double by) {
   State state(cube(), {.tools = {plain({.radius = radius, .friction = friction})}, .max_contacts = 256});
   const Vec3 pressed(0.4, 0.5, 1.0 + radius - 0.06);
   go(cube(), state, Vec3(0.4, 0.5, 1.0 + radius + 0.01), pose(pressed), 200);
   hold(cube(), state, pose(pressed), 20);
   const std::vector<ContactPoint> before(state.contacts().begin(), state.contacts().end());
-  step(cube(), state, pose(pressed + Vec3(0.1, 0.0, -0.02)));
+  step(cube(), state, pose(pressed + Vec3(by, 0.0, -0.2 * by)));
   const auto last =
       std::span(state.scratch.last.contacts).first(static_cast<std::size_t>(state.scratch.last.count));
   const bool same = std::equal(before.begin(), before.end(), last.begin(), last.end(),
                                [](const ContactPoint& a, const ContactPoint& b) {
                                  return a.feature == b.feature && a.position == b.position;
                                });
-  return {state.scratch.problem.single, !same};
+  return {state.scratch.problem.single, state.surface.near.added_blocks(), !same};
 }
 
-TEST(Passes, AreRepeatedWhereContactsAreFew) {
-  const auto [few_are_many, few_repeat] = slide_far(2.0, 0.0);
-  const auto [many, many_repeat] = slide_far(2.0, 0.3);
-  EXPECT_FALSE(few_are_many);
-  EXPECT_TRUE(few_repeat);
-  EXPECT_TRUE(many);
-  EXPECT_FALSE(many_repeat);
+TEST(Passes, AreRepeatedWhereThereIsTime) {
+  const Slide few = slide(0.15, 0.0, 0.1), far = slide(2.0, 0.0, 0.1), many = slide(2.0, 0.3, 0.01);
+  EXPECT_FALSE(few.has_many_contacts);
+  EXPECT_LE(few.blocks, tuning.passes.most_blocks);
+  EXPECT_TRUE(few.repeats);
+  EXPECT_FALSE(far.has_many_contacts);
+  EXPECT_GT(far.blocks, tuning.passes.most_blocks);
+  EXPECT_FALSE(far.repeats);
+  EXPECT_TRUE(many.has_many_contacts);
+  EXPECT_LE(many.blocks, tuning.passes.most_blocks);
+  EXPECT_FALSE(many.repeats);
 }
 
 TEST(Remember, FindsContactsByTheirFeature) {
