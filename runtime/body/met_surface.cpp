@@ -33,8 +33,10 @@ bool is_even(const Model& model) noexcept {
          });
 }
 
-MetSurface met_surface(const Model& model, double radius) {
-  constexpr double spacing = 0.15;     // [radius] between the nodes that the tool meets
+MetSurface met_surface(const Model& model, double radius, bool has_patches) {
+  // [radius] between the nodes that the tool meets: under patches (PatchMaker) they are loaded as points, and
+  // too soft where they are few.
+  const double spacing = has_patches ? 0.15 : 0.21;
   constexpr double fine_enough = 0.2;  // [radius] edges
   constexpr double most_nodes = 4e5;   // some 150 bytes each, and a second of loading
   const double edge = surface_edge(model);

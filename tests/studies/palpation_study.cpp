@@ -25,6 +25,7 @@
 
 #include "base/error.h"
 #include "formats/model_file.h"
+#include "runtime/body/met_surface.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/loop/real_time.h"
 #include "tests/bench/palpation_paths.h"
@@ -325,9 +326,12 @@ struct Arguments {
 };
 
 void study(const Arguments& arguments) {
-  const Body body(load_model(arguments.model));
   const double radius = arguments.palpation.radius;
-  const auto poses = test::palpation_poses(body, arguments.palpation,
+  Model model = load_model(arguments.model);
+  const MetSurface met = met_surface(model, radius);  // as `play` by default
+  const Body body(std::move(model), {}, met.refinement, ContactModel::quasi_static, met.is_local);
+  const Body of_mesh(load_model(arguments.model));  // for the path, whatever the surface
+  const auto poses = test::palpation_poses(of_mesh, arguments.palpation,
                                            static_cast<std::int64_t>(arguments.seconds / test::tick));
   const State start(body, {.tools = {Tool{.radius = radius,
                                           .coupling_stiffness = arguments.coupling,
@@ -342,7 +346,7 @@ void study(const Arguments& arguments) {
       "{}: sphere of {:.1f} mm, {} ticks, seed {}, {:.1f} m of way, {} grabs, {:.0f} % of the free "
       "surface\n\n",
       body.model().name, 1e3 * radius, poses.size(), arguments.palpation.seed, way, grabs,
-      100.0 * touched_share(body, poses, 2.0 * radius));
+      100.0 * touched_share(of_mesh, poses, 2.0 * radius));
   std::fflush(stdout);
 
   const IdleMemory idle(static_cast<std::size_t>(body.greens().order() * body.greens().order() *

@@ -261,6 +261,14 @@ void LocalCompliance::measure(const ElasticBody& body) {
     points_[k].normal.normalize();
     points_[k].disc = std::sqrt(area[k] / 3.0 / std::numbers::pi);
   }
+  for (std::size_t s = 0; s < simplices.size(); s += 3) {
+    const Vec3 &a = point(simplices[s]).x, &b = point(simplices[s + 1]).x, &c = point(simplices[s + 2]).x;
+    const Vec3 normal = (b - a).cross(c - a).normalized();
+    for (const Index node : simplices.subspan(s, 3)) {
+      Point& point = points_[at(node)];
+      point.crease = std::max(point.crease, std::acos(std::clamp(normal.dot(point.normal), -1.0, 1.0)));
+    }
+  }
 }
 
 /// Finds the reach by the edges of the body's own mesh, and the axes that are free.

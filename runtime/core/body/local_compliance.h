@@ -39,8 +39,9 @@ class LocalCompliance {
     Vec3 x = Vec3::Zero(), normal = Vec3::Zero();
     Vec3 share = Vec3::Zero();  ///< of each axis that is free: 1, on held nodes 0
     double reach = 0.0;         ///< [m] four edges
-    double part = 1.0;  ///< of B and D that count: less near nodes that are held along some axes, 0 there
-    double disc = 0.0;  ///< radius of the disc as large as its part of the surface [m]
+    double part = 1.0;    ///< of B and D that count: less near nodes that are held along some axes, 0 there
+    double disc = 0.0;    ///< radius of the disc as large as its part of the surface [m]
+    double crease = 0.0;  ///< [rad] largest angle between the normal and those of the faces around
   };
   [[nodiscard]] const Point& point(Index node) const noexcept {
     return points_[static_cast<std::size_t>(node)];

@@ -30,8 +30,10 @@ struct DetectionTuning {
   /// +20 / -15 and -3, at 4.4 +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0 and -3.
   double smooth_radius = 3.0;
   double slips = 0.7;  ///< cosine between a normal and the surface's at rest from which on fine nodes are
-                       ///< held by friction, and at which by one of 1 (docs/overlays.md)
-  double holds = 0.5;
+                       ///< held by friction (docs/overlays.md)
+  double holds = 0.5;  ///< the same where it is a friction of 1, and beyond which they are not touched: of
+                       ///< 40 000 ticks of palpation with a sphere of 5 mm (palpation_study, friction 0.2) it
+                       ///< is lost in the body in 20 in place of 365, and 51 take more than 1 ms, not 141
   double large_disc = 2.0;    ///< [edge of the simplex] radius above which a disc needs no points of the rim
                               ///< inside faces: its arc between two edges is within 1/16 of an edge of its
                               ///< chord

@@ -105,12 +105,18 @@ bool rolls(const LastContacts& remembered, const Tool& tool, const ContactPoint&
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
+/// Cosine of the angle by which a contact's normal is off the surface's at rest; on a crease, off that of the
+/// nearest of the faces around.
+double inclination(const LocalCompliance::Point& point, const Vec3& normal) noexcept {
+  const double angle = std::acos(std::clamp(point.normal.dot(normal), -1.0, 1.0));
+  return std::cos(std::max(0.0, angle - point.crease));
+}
+
 /// Friction with which a node is kept from slipping round the side of a tool, which the surface of a body of
 /// small strain does once the tool is deeper than 1.3 of its radius; it would be lost inside. None where the
 /// normal is within 45 degrees of the surface's at rest, which a sphere is up to 0.6 of its radius deep.
-double holding_friction(const LocalCompliance& local, Index node, const Vec3& normal) noexcept {
+double holding_friction(double inclination) noexcept {
   const DetectionTuning& limits = tuning.detection;
-  const double inclination = local.point(node).normal.dot(normal);
   return std::clamp((limits.slips - inclination) / (limits.slips - limits.holds), 0.0, 1.0);
 }
 
@@ -126,6 +132,9 @@ void add_candidate(const ElasticBody& body, State& state, Scratch& scratch, Inde
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   const Index vertex = vertex_of(nodes, pair.nearest.weights);
   if (is_duplicate(body, scratch.detection, begin, pair.nearest.on_simplex, normal, vertex)) return;
+  const bool is_fine = vertex >= 0 && body.local() != nullptr;
+  const double inclined = is_fine ? inclination(body.local()->point(vertex), normal) : 1.0;
+  if (inclined < tuning.detection.holds) return;
   if (vertex >= 0) {
     scratch.detection.candidate_at_node[vertex] = scratch.detection.candidate_count;
   } else {
@@ -145,8 +154,7 @@ void add_candidate(const ElasticBody& body, State& state, Scratch& scratch, Inde
   contact.frame = contact_frame(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
-  if (vertex >= 0 && body.local() != nullptr)
-    contact.friction = std::max(contact.friction, holding_friction(*body.local(), vertex, normal));
+  if (is_fine) contact.friction = std::max(contact.friction, holding_friction(inclined));
   contact.rolls = !face_tells && rolls(scratch.last, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
