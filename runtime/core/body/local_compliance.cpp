@@ -1,6 +1,7 @@
 #include "runtime/core/body/local_compliance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -29,33 +30,59 @@ double share_of_sides(const Point& a, const Point& b) noexcept {
   return 0.5 * (1.0 + a.normal.dot(b.normal));
 }
 
-/// Share of the half-space that is left at a distance: 1 at 0, 0 at the reach.
-double left_at(double distance, const Point& a, const Point& b) noexcept {
-  const double q = 2.0 * distance / (a.reach + b.reach);
-  return q < 1.0 ? (1.0 - q * q) * (1.0 - q * q) : 0.0;
+/// Share of the half-space that is left at a distance r: 1 at 0, 0 from the mean of two reaches on.
+inline double left_at(double squared_r, double sum_of_reaches) noexcept {
+  const double left = std::max(0.0, 1.0 - 4.0 * squared_r / (sum_of_reaches * sum_of_reaches));
+  return left * left;
 }
 
-/// Displacement of the half-space's surface at `a` by a force at `b` (Johnson, Contact Mechanics, 1985, 3.2
-/// and 3.6), times pi E / (1 + nu) [1/m].
-Mat3 half_space(const Point& a, const Point& b, double nu) noexcept {
-  const Vec3 x = a.x - b.x, n = (a.normal + b.normal).normalized();
-  const double r = x.norm();
-  const Vec3 q = (x - n * n.dot(x)) / r, turned = 0.5 * (1.0 - 2.0 * nu) * q;
-  Mat3 B = nu * q * q.transpose() + turned * n.transpose() - n * turned.transpose();
-  B.diagonal().array() += 1.0 - nu;
-  return B / r;
+/// Point as the half-space sees it, in plain numbers, so that loops over points use the vector units.
+struct Numbers {
+  double x, y, z, u, v, w;  // place, normal
+  double reach, disc;
+};
+
+/// Fading of the half-space.
+enum class Fade : std::uint8_t { by_distance, none };
+
+/// B along all axes, by rows, times pi E / (1 + nu) [1/m]: displacement of the half-space's surface at `a` by
+/// a force at `b` (Johnson, Contact Mechanics, 1985, 3.2 and 3.6); at `b` itself by the force on its own
+/// part.
+template <Fade fade>
+inline std::array<double, 9> half_space(const Numbers& a, const Numbers& b, double nu) noexcept {
+  const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
+  const double r2 = dx * dx + dy * dy + dz * dz;
+  const double sides = 0.5 * (1.0 + a.u * b.u + a.v * b.v + a.w * b.w);
+  const double of_n = 0.5 / std::sqrt(std::max(sides, least_share));
+  const double nx = of_n * (a.u + b.u), ny = of_n * (a.v + b.v), nz = of_n * (a.w + b.w);
+  const bool is_own = r2 == 0.0;
+  const double of_r = is_own ? of_lattice / b.disc : 1.0 / std::sqrt(r2);
+  const double left = fade == Fade::none ? 1.0 : left_at(r2, a.reach + b.reach);
+  const double on_both = sides < least_share ? 0.0 : sides * left;
+  const double factor = of_r * (is_own ? 1.0 : on_both);
+  const double along = dx * nx + dy * ny + dz * nz;
+  const double qx = is_own ? a.u : of_r * (dx - along * nx), qy = is_own ? a.v : of_r * (dy - along * ny),
+               qz = is_own ? a.w : of_r * (dz - along * nz);
+  const double even = factor * (is_own ? 1.0 - 0.5 * nu : 1.0 - nu),
+               by_q = factor * (is_own ? -0.5 * nu : nu),
+               turned = is_own ? 0.0 : factor * 0.5 * (1.0 - 2.0 * nu);
+  const double xy = by_q * qx * qy, xz = by_q * qx * qz, yz = by_q * qy * qz;
+  const double turned_xy = turned * (qx * ny - nx * qy), turned_xz = turned * (qx * nz - nx * qz),
+               turned_yz = turned * (qy * nz - ny * qz);
+  return {even + by_q * qx * qx, xy + turned_xy, xz + turned_xz, xy - turned_xy,       even + by_q * qy * qy,
+          yz + turned_yz,        xz - turned_xz, yz - turned_yz, even + by_q * qz * qz};
 }
 
-/// Displacement of a node by the force on its own part of the surface, times pi E / (1 + nu) [1/m].
-Mat3 half_space(const Point& a, double nu) noexcept {
-  Mat3 B = -0.5 * nu * a.normal * a.normal.transpose();
-  B.diagonal().array() += 1.0 - 0.5 * nu;
-  return of_lattice / a.disc * B;
+Numbers numbers_of(const Point& p) noexcept {
+  return {p.x.x(), p.x.y(), p.x.z(), p.normal.x(), p.normal.y(), p.normal.z(), p.reach, p.disc};
 }
 
-/// Leaves what acts along free axes.
-Mat3 along_free_axes(const Mat3& B, const Point& a, const Point& b) noexcept {
-  return a.share.asDiagonal() * B * b.share.asDiagonal();
+/// B along free axes, times pi E / (1 + nu) [1/m].
+template <Fade fade>
+Mat3 block(const Point& a, const Point& b, double nu) noexcept {
+  const std::array<double, 9> of_all = half_space<fade>(numbers_of(a), numbers_of(b), nu);
+  return a.share.asDiagonal() * Mat3(Eigen::Map<const Mat3>(of_all.data()).transpose()) *
+         b.share.asDiagonal();
 }
 
 /// Xi - D, with D by blocks between stored nodes.
@@ -184,14 +211,12 @@ class MeshPart {
   }
   [[nodiscard]] Mat3 xi(Index a, Index b) const { return body_.greens().block(stored(a), stored(b)); }
   [[nodiscard]] double left(Index a, Index b) const noexcept {
-    return left_at((points_[at(a)].x - points_[at(b)].x).norm(), points_[at(a)], points_[at(b)]);
+    const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
+    return left_at((of_a.x - of_b.x).squaredNorm(), of_a.reach + of_b.reach);
   }
   /// The half-space between two nodes, not faded.
   [[nodiscard]] Mat3 near(Index a, Index b) const noexcept {
-    const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
-    const double share = share_of_sides(of_a, of_b);
-    if (share < least_share) return Mat3::Zero();
-    return c_ * share * along_free_axes(half_space(of_a, of_b, nu_), of_a, of_b);
+    return c_ * block<Fade::none>(points_[at(a)], points_[at(b)], nu_);
   }
 
   /// Mean of Xi - B at the nodes two edges away, where the mesh is right; of those one edge away if there are
@@ -334,54 +359,31 @@ void LocalCompliance::fade_at_planes(const ElasticBody& body, const std::vector<
 }
 
 Mat3 LocalCompliance::between(const Point& a, const Point& b) const noexcept {
-  const double distance = (a.x - b.x).norm(), part = c_ * a.part * b.part;
-  if (distance == 0.0) return part * along_free_axes(half_space(a, nu_), a, b);
-  const double left = left_at(distance, a, b), share = share_of_sides(a, b);
-  if (left == 0.0 || share < least_share) return Mat3::Zero();
-  return part * left * share * along_free_axes(half_space(a, b, nu_), a, b);
+  return c_ * a.part * b.part * block<Fade::by_distance>(a, b, nu_);
 }
 
 void LocalCompliance::add_row(const Point& a, const LocalPoints& loaded, Index count,
                               double* rows) const noexcept {
-  // The formulas of `between`, written out for the vector units.
-  const double *bx = loaded[0], *by = loaded[1], *bz = loaded[2], *bu = loaded[3], *bv = loaded[4],
-               *bw = loaded[5], *share_x = loaded[6], *share_y = loaded[7], *share_z = loaded[8],
-               *reach = loaded[9], *disc = loaded[10];
-  const Vec3 x = a.x, m = a.normal, of_a = c_ * a.part * a.share;
-  const double nu = nu_, of_reach = a.reach;
+  const double *x = loaded[0], *y = loaded[1], *z = loaded[2], *u = loaded[3], *v = loaded[4], *w = loaded[5],
+               *share_x = loaded[6], *share_y = loaded[7], *share_z = loaded[8], *reach = loaded[9],
+               *disc = loaded[10];
+  const Numbers of_a = numbers_of(a);
+  const double nu = nu_, part = c_ * a.part;
+  const double ax = part * a.share.x(), ay = part * a.share.y(), az = part * a.share.z();
   double *row_x = rows, *row_y = rows + std::ptrdiff_t{3} * count, *row_z = rows + std::ptrdiff_t{6} * count;
 #pragma omp simd
   for (std::ptrdiff_t k = 0; k < count; ++k) {
-    const double dx = x[0] - bx[k], dy = x[1] - by[k], dz = x[2] - bz[k];
-    const double r2 = dx * dx + dy * dy + dz * dz;
-    const double cosine = m[0] * bu[k] + m[1] * bv[k] + m[2] * bw[k];
-    const double sides = 0.5 * (1.0 + cosine);
-    const double of_n = 0.5 / std::sqrt(std::max(sides, least_share));
-    const double nx = of_n * (m[0] + bu[k]), ny = of_n * (m[1] + bv[k]), nz = of_n * (m[2] + bw[k]);
-    const bool is_own = r2 == 0.0;
-    const double of_r = is_own ? of_lattice / disc[k] : 1.0 / std::sqrt(r2);
-    const double all = of_reach + reach[k];
-    const double left = std::max(0.0, 1.0 - 4.0 * r2 / (all * all));
-    const double on_both = sides < least_share ? 0.0 : sides * left * left;
-    const double factor = of_r * (is_own ? 1.0 : on_both);
-    const double along = dx * nx + dy * ny + dz * nz;
-    const double qx = is_own ? m[0] : of_r * (dx - along * nx), qy = is_own ? m[1] : of_r * (dy - along * ny),
-                 qz = is_own ? m[2] : of_r * (dz - along * nz);
-    const double even = factor * (is_own ? 1.0 - 0.5 * nu : 1.0 - nu),
-                 by_q = factor * (is_own ? -0.5 * nu : nu),
-                 turned = is_own ? 0.0 : factor * 0.5 * (1.0 - 2.0 * nu);
-    const double xy = by_q * qx * qy, xz = by_q * qx * qz, yz = by_q * qy * qz;
-    const double turned_xy = turned * (qx * ny - nx * qy), turned_xz = turned * (qx * nz - nx * qz),
-                 turned_yz = turned * (qy * nz - ny * qz);
-    row_x[3 * k] += of_a[0] * share_x[k] * (even + by_q * qx * qx);
-    row_x[3 * k + 1] += of_a[0] * share_y[k] * (xy + turned_xy);
-    row_x[3 * k + 2] += of_a[0] * share_z[k] * (xz + turned_xz);
-    row_y[3 * k] += of_a[1] * share_x[k] * (xy - turned_xy);
-    row_y[3 * k + 1] += of_a[1] * share_y[k] * (even + by_q * qy * qy);
-    row_y[3 * k + 2] += of_a[1] * share_z[k] * (yz + turned_yz);
-    row_z[3 * k] += of_a[2] * share_x[k] * (xz - turned_xz);
-    row_z[3 * k + 1] += of_a[2] * share_y[k] * (yz - turned_yz);
-    row_z[3 * k + 2] += of_a[2] * share_z[k] * (even + by_q * qz * qz);
+    const auto B =
+        half_space<Fade::by_distance>(of_a, {x[k], y[k], z[k], u[k], v[k], w[k], reach[k], disc[k]}, nu);
+    row_x[3 * k] += ax * share_x[k] * B[0];
+    row_x[3 * k + 1] += ax * share_y[k] * B[1];
+    row_x[3 * k + 2] += ax * share_z[k] * B[2];
+    row_y[3 * k] += ay * share_x[k] * B[3];
+    row_y[3 * k + 1] += ay * share_y[k] * B[4];
+    row_y[3 * k + 2] += ay * share_z[k] * B[5];
+    row_z[3 * k] += az * share_x[k] * B[6];
+    row_z[3 * k + 1] += az * share_y[k] * B[7];
+    row_z[3 * k + 2] += az * share_z[k] * B[8];
   }
 }
 
