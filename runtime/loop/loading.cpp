@@ -86,7 +86,8 @@ void prepare_for_law(Model& model, const BodyOptions& options) {
 MetSurface met_surface(const Model& model, const BodyOptions& options) {
   const bool is_of_simplices = traits(model.mesh.element).corners == model.dimension() + 1;
   const bool by_radius = options.radius > 0.0 && (options.graded ? is_of_simplices : is_even(model));
-  return by_radius ? met_surface(model, options.radius, options.graded) : MetSurface{.refinement = options.refinement};
+  return by_radius ? met_surface(model, options.radius, options.graded)
+                   : MetSurface{.refinement = options.refinement};
 }
 
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
