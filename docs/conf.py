@@ -54,7 +54,7 @@ CHAPTERS = {
         "overlays",
         "dynamics",
         "live",
-        "warp",
+        "depth",
         "probe",
         "viewer",
         "slicer",

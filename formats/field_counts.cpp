@@ -21,8 +21,6 @@ std::int64_t smallest(Count count) {
     case Count::smooth_terms:
     case Count::near_pairs:
     case Count::clusters:
-    case Count::warp_nodes:
-    case Count::warp_levels:
       return 1;
     case Count::nodes:
       return 3;

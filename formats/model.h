@@ -99,27 +99,6 @@ struct StoredDynamics {
   }
 };
 
-/// Errors of small strain and of warping over the body's rotation, against a corotational body of the same
-/// mesh bent by a growing force on some nodes (docs/warp.md).
-struct WarpStudy {
-  /// Errors of one of them at each level, relative to the corotational body; infinite where it has no
-  /// solution.
-  struct Errors {
-    std::vector<double> force;         ///< [L] of the force for the same displacement of the nodes [-]
-    std::vector<double> displacement;  ///< [L] of the nodes' mean displacement under the same force [-]
-  };
-
-  std::vector<Index> nodes;  ///< [P] mesh nodes on the surface under the force, ascending; none: no study
-  Vec3 direction = Vec3::Zero();  ///< of the force at rest [-]; rotates with the nodes
-  std::vector<double> force;      ///< [L] ascending [N]
-  std::vector<double> rotation;   ///< [L] largest rotation of the corotational body's surface, ascending
-                                  ///< [rad]
-  Errors linear;                  ///< of small strain
-  Errors warped;                  ///< of warping
-
-  [[nodiscard]] bool any() const noexcept { return !nodes.empty(); }
-};
-
 /// All baked data. Constant once loaded, used by all threads. With d = dimension(), a stored dof is
 /// d k + axis for stored node k; `stored_nodes[k]` is its mesh node. A node held along some axes only is
 /// stored whole: rows and columns of its held dofs are zero.
@@ -148,7 +127,6 @@ struct Model {
   std::vector<Probe> probes;
   StoredOverlay overlay;
   StoredDynamics dynamics;
-  WarpStudy warp;
   /// Xi of the stored dofs [m/N], packed or, with `greens` empty, in nested low-rank form.
   PackedGreens greens;
   std::shared_ptr<const HierarchicalMatrix> compressed;

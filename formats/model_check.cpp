@@ -4,9 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "base/error.h"
 #include "formats/dynamics_fields.h"
@@ -16,8 +14,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double unit_tolerance = 1e-9;  // of a direction's length
 
 /// Sets the counts that the sizes of the patches' matrices imply.
 void count_patches(const Model& model, Counts& counts) {
@@ -85,8 +81,8 @@ void check_nothing_stored(const Model& model, const std::string& where) {
   if (!model.stored_nodes.empty())
     refuse(where, "/dofs/stored_nodes has " + std::to_string(model.stored_nodes.size()) +
                       " entries, but the scope is none");
-  if (model.overlay.refinement != 0 || model.dynamics.method != DynamicsMethod::none || model.warp.any())
-    refuse(where, "the scope is none, but there are overlays, dynamics or a study of warping");
+  if (model.overlay.refinement != 0 || model.dynamics.method != DynamicsMethod::none)
+    refuse(where, "the scope is none, but there are overlays or dynamics");
 }
 
 void check_range(const char* path, int value, int low, int high, const std::string& where) {
@@ -118,55 +114,6 @@ void check_overlay(const Model& model, const std::string& where) {
   }
 }
 
-void check_loaded_nodes(const Model& model, const std::string& where) {
-  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
-  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
-  const std::vector<Index>& nodes = model.warp.nodes;
-  if (!std::is_sorted(nodes.begin(), nodes.end(), std::less_equal<>()))
-    refuse(where, "/warp/nodes does not ascend");
-  for (const Index node : nodes) {
-    const auto k = static_cast<std::size_t>(node);
-    if (!on_surface[k] || model.fixed[k] != 0)
-      refuse(where,
-             fmt::format("/warp/nodes: node {} is {}", node, on_surface[k] ? "held" : "not on the surface"));
-  }
-}
-
-/// Checks that numbers are positive and ascending.
-void check_ascent(const char* path, const std::vector<double>& values, const std::string& where) {
-  double before = 0.0;
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    if (!(values[k] > before))
-      refuse(where, fmt::format("{} is not positive and ascending (entry {})", path, k));
-    before = values[k];
-  }
-}
-
-void check_errors(const char* path, const WarpStudy::Errors& errors, const std::string& where) {
-  for (std::size_t k = 0; k < errors.force.size(); ++k) {
-    if (!(errors.force[k] >= -1.0) || !(errors.displacement[k] >= 0.0))
-      refuse(where, fmt::format("{}: row {} is {} and {}: the error of a force is at least -1, and that of a "
-                                "displacement 0",
-                                path, k, errors.force[k], errors.displacement[k]));
-  }
-}
-
-void check_warp(const Model& model, const std::string& where) {
-  const WarpStudy& study = model.warp;
-  check_loaded_nodes(model, where);
-  if (!(std::abs(study.direction.norm() - 1.0) <= unit_tolerance))
-    refuse(where, fmt::format("/warp/direction has the length {}, not 1", study.direction.norm()));
-  if (model.dimension() == 2 && study.direction.z() != 0.0)
-    refuse(where, fmt::format("/warp/direction has z = {}, in the plane it is 0", study.direction.z()));
-  check_ascent("/warp/force", study.force, where);
-  check_ascent("/warp/rotation", study.rotation, where);
-  if (study.rotation.back() > std::numbers::pi)
-    refuse(where,
-           fmt::format("/warp/rotation ends at {}, which is beyond half a turn", study.rotation.back()));
-  check_errors("/warp/linear", study.linear, where);
-  check_errors("/warp/warped", study.warped, where);
-}
-
 }  // namespace
 
 Counts counts_of(const Model& model, std::string where) {
@@ -188,10 +135,6 @@ Counts counts_of(const Model& model, std::string where) {
     set(Count::matrix_entries, model.dynamics.matrices.row.size(), "/dynamics/matrices/row");
   if (model.dynamics.method == DynamicsMethod::modal)
     counts.set(Count::modes, model.dynamics.modes(), "/dynamics/modes/omega");
-  if (model.warp.any()) {
-    set(Count::warp_nodes, model.warp.nodes.size(), "/warp/nodes");
-    set(Count::warp_levels, model.warp.force.size(), "/warp/force");
-  }
   if (model.greens.smooth() != nullptr)
     counts.set(Count::smooth_terms, model.greens.smooth()->terms, "/greens/smooth");
   if (model.compressed != nullptr) count_tree(*model.compressed, counts);
@@ -218,7 +161,6 @@ void check_model(const Model& model, const std::string& where) {
   if (model.scope == Scope::none) check_nothing_stored(model, where);
   if (model.overlay.refinement != 0) check_overlay(model, where);
   if (model.dynamics.method != DynamicsMethod::none) check_dynamics(model, where);
-  if (model.warp.any()) check_warp(model, where);
 }
 
 std::string rest_warning(const Model& model) {

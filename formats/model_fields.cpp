@@ -96,30 +96,6 @@ ElementType element_from(const std::string& text) {
   throw Unreadable{"is '" + text + "', not tri3, quad4, tet4, tet10 or hex8"};
 }
 
-std::vector<double> warp_direction(const Model& model) {
-  const Vec3& direction = model.warp.direction;
-  return {direction.x(), direction.y(), direction.z()};
-}
-
-void put_warp_direction(Model& model, const std::vector<double>& values) {
-  model.warp.direction = {values[0], values[1], values[2]};
-}
-
-std::vector<double> by_turns(const WarpStudy::Errors& errors) {
-  std::vector<double> values;
-  for (std::size_t k = 0; k < errors.force.size(); ++k)
-    values.insert(values.end(), {errors.force[k], errors.displacement[k]});
-  return values;
-}
-
-void put_by_turns(WarpStudy::Errors& errors, const std::vector<double>& values) {
-  errors = {};
-  for (std::size_t k = 0; k + 1 < values.size(); k += 2) {
-    errors.force.push_back(values[k]);
-    errors.displacement.push_back(values[k + 1]);
-  }
-}
-
 void expect_dimension(const Model& model, std::int64_t dimension) {
   if (dimension != model.dimension())
     throw Unreadable{"is " + std::to_string(dimension) + ", that of " + text_of(model.mesh.element) +

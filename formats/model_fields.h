@@ -35,11 +35,9 @@ enum class Count : std::uint8_t {
   near_pairs,
   far_pairs,
   clusters,
-  certified,   // kinds of touches
-  warp_nodes,  // loaded nodes
-  warp_levels
+  certified  // kinds of touches
 };
-inline constexpr std::size_t number_of_counts = 23;
+inline constexpr std::size_t number_of_counts = 21;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {
@@ -112,11 +110,6 @@ std::vector<double> patch_transfers(const Model& model);
 void put_patch_transfers(Model& model, const std::vector<double>& values);
 std::vector<double> patch_compliances(const Model& model);
 void put_patch_compliances(Model& model, const std::vector<double>& values);
-std::vector<double> warp_direction(const Model& model);
-void put_warp_direction(Model& model, const std::vector<double>& values);
-/// Errors of force and displacement, alternating.
-std::vector<double> by_turns(const WarpStudy::Errors& errors);
-void put_by_turns(WarpStudy::Errors& errors, const std::vector<double>& values);
 
 void expect_dimension(const Model& model, std::int64_t dimension);
 ElementType element_from(const std::string& text);
@@ -343,44 +336,8 @@ void for_each_overlay_field(Visitor&& visit) {
       "/overlay/compliance", {{Count::patch_compliance_entries}}, patch_compliances, put_patch_compliances});
 }
 
-inline constexpr const char* warp_group = "/warp";
-
-/// Datasets of files with a study of [warp]; other files do not have the group.
-template <class Visitor>
-void for_each_warp_field(Visitor&& visit) {
-  using Doubles = std::vector<double>;
-  const Extent levels = {Count::warp_levels}, two = {Count::one, 2, 0};
-  constexpr bool infinite = true;
-  visit(Field<std::int32_t>{"/warp/nodes",
-                            {{Count::warp_nodes}},
-                            [](const Model& m) { return m.warp.nodes; },
-                            [](Model& m, const std::vector<std::int32_t>& v) { m.warp.nodes = v; },
-                            {Count::nodes}});
-  visit(Field<double>{"/warp/direction", {{Count::one, 3, 0}}, warp_direction, put_warp_direction});
-  visit(Field<double>{"/warp/force",
-                      {levels},
-                      [](const Model& m) { return m.warp.force; },
-                      [](Model& m, const Doubles& v) { m.warp.force = v; }});
-  visit(Field<double>{"/warp/rotation",
-                      {levels},
-                      [](const Model& m) { return m.warp.rotation; },
-                      [](Model& m, const Doubles& v) { m.warp.rotation = v; }});
-  visit(Field<double>{"/warp/linear",
-                      {levels, two},
-                      [](const Model& m) { return by_turns(m.warp.linear); },
-                      [](Model& m, const Doubles& v) { put_by_turns(m.warp.linear, v); },
-                      {Count::one, 0, 0},
-                      infinite});
-  visit(Field<double>{"/warp/warped",
-                      {levels, two},
-                      [](const Model& m) { return by_turns(m.warp.warped); },
-                      [](Model& m, const Doubles& v) { put_by_turns(m.warp.warped, v); },
-                      {Count::one, 0, 0},
-                      infinite});
-}
-
-/// All datasets except those of overlays, dynamics and [warp], and except the Green's functions, which are
-/// mapped and not copied.
+/// All datasets except those of overlays and dynamics, and except the Green's functions, which are mapped and
+/// not copied.
 template <class Visitor>
 void for_each_field(ElementType element, Visitor&& visit) {
   for_each_body_field(element, visit);

@@ -103,16 +103,14 @@ void Reader::read_body() {
 /// Reads everything before the Green's functions.
 void Reader::read_known() {
   read_body();
-  if (model_.scope == Scope::none &&
-      (file_.has(overlay_group) || file_.has(dynamics_group) || file_.has(warp_group)))
-    refuse(where_, "the scope is none, but there are overlays, dynamics or a study of warping");
+  if (model_.scope == Scope::none && (file_.has(overlay_group) || file_.has(dynamics_group)))
+    refuse(where_, "the scope is none, but there are overlays or dynamics");
   if (file_.has(overlay_group)) {
     for_each_overlay_field([this](const auto& field) { read_field(field); });
     if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
   }
   if (file_.has(dynamics_group))
     for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
-  if (file_.has(warp_group)) for_each_warp_field([this](const auto& field) { read_field(field); });
   if (header_.precision == Precision::split_precision && model_.scope != Scope::none)
     for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
   if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });

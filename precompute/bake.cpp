@@ -28,7 +28,6 @@
 #include "precompute/numerics/overlay_regions.h"
 #include "precompute/progress.h"
 #include "precompute/spread_plan.h"
-#include "precompute/warping/warp_study.h"
 
 namespace palpate {
 namespace {
@@ -194,21 +193,6 @@ bool add_dynamics(const BakeRun& run, const DynamicsPlan& plan, const AssembledB
   return true;
 }
 
-/// Adds a study of warping if requested. Returns false, in all processes, if interrupted.
-bool add_warp(const BakeRun& run, Model& model) {
-  if (!run.description.warp) return true;
-  run.progress.begin(warp_stage);
-  const std::optional<WarpStudyResult> result = study_warp(model, *run.description.warp, [&](double share) {
-    run.progress.reach(share);
-    return !run.interrupted();
-  });
-  if (run.team.any(!result)) return false;
-  model.warp = result->study;
-  run.progress.line(range_text(model.warp));
-  if (!result->note.empty()) run.progress.line("note: the study of [warp] " + result->note);
-  return true;
-}
-
 /// The precision of an interrupted run that has left what comes before the columns, which the model takes.
 std::optional<Precision> take_up(const BakeRun& run, Model& model) {
   const BakeOptions& options = run.options;
@@ -240,7 +224,7 @@ std::optional<Precision> describe(const BakeRun& run, const BakePlan& plan, cons
     model.compressed = std::make_shared<const HierarchicalMatrix>(plan.compression->frame);
   if (!add_overlays(run, plan.overlays, model)) return {};
   if (const auto left = take_up(run, model)) return left;
-  if (!add_dynamics(run, plan.dynamics, body, factor, stored.dofs, model) || !add_warp(run, model)) return {};
+  if (!add_dynamics(run, plan.dynamics, body, factor, stored.dofs, model)) return {};
   if (plan.compression) return Precision::single_precision;
   run.progress.begin(precision_stage);
   return decide_precision(run, body, factor, stored.dofs, model);

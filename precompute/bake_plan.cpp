@@ -15,7 +15,6 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t large_file = 4'000'000'000;  // [byte] too large for many computers to load
-constexpr double warp_factors = 75.0;  // per level: about 25 without supernodes, each three times as slow
 
 void print_plan(const BakeRun& run, const Plan& plan, const Model& model, bool compressed) {
   const QualityReport& quality = model.quality;
@@ -145,7 +144,6 @@ void announce_locking(const BakeRun& run, const Model& model) {
 BakePlan announce(const BakeRun& run, const Model& model, const AssembledBody& body) {
   const Description& description = run.description;
   BakePlan bake{make_plan(model.mesh, *body.factor, body.solver, description.precision, run.jobs)};
-  if (description.warp) bake.warp_levels = description.warp->levels;
   Plan& plan = bake.plan;
   if (wants_compression(description, plan.stored_dofs / model.dimension())) {
     bake.packed = plan;
@@ -216,13 +214,12 @@ void note(const BakePlan& bake, BakeSummary& summary) {
 }  // namespace
 
 std::vector<Stage> stages_of(const BakePlan& bake, int jobs, int ranks) {
-  const auto& [plan, packed_plan, compression, overlays, dynamics, warp_levels, part] = bake;
+  const auto& [plan, packed_plan, compression, overlays, dynamics, part] = bake;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
-  if (warp_levels > 0) stages.push_back({warp_stage, warp_factors * warp_levels * plan.factor_seconds});
   if (compression) {
     const std::vector<Stage> more = compression_stages(*compression, ranks);
     stages.insert(stages.end(), more.begin(), more.end());

@@ -19,7 +19,6 @@ namespace palpate {
 inline constexpr const char* factor_stage = "factorising K";
 inline constexpr const char* overlay_stage = "overlays";
 inline constexpr const char* modes_stage = "looking for modes";
-inline constexpr const char* warp_stage = "bending the body";
 inline constexpr const char* precision_stage = "choosing the precision";
 inline constexpr const char* write_stage = "writing the file";
 
@@ -30,7 +29,6 @@ struct BakePlan {
   std::optional<CompressionPlan> compression{};
   OverlayPlan overlays{};
   DynamicsPlan dynamics{};
-  Index warp_levels = 0;           ///< for a study of [warp]
   std::optional<BakePart> part{};  ///< requested part: the same columns of all matrices
 };
 

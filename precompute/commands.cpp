@@ -233,7 +233,7 @@ CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
       ->required()
       ->type_name("");
   command->footer(
-      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics, warping\n"
+      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics\n"
       "and source files.\n"
       "Example:\n"
       "  palpate-precompute inspect cube.palpate.hdf");

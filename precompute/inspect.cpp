@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "base/printable.h"
@@ -12,7 +11,6 @@
 #include "meshes/material_fields.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/numerics/precision.h"
-#include "precompute/warping/warp_study.h"
 
 namespace palpate {
 namespace {
@@ -120,30 +118,6 @@ std::string overlay_text(const Model& model) {
                      8e-6 * static_cast<double>(entries));
 }
 
-/// A ratio in per cent; "none" if there is none.
-std::string percent_text(double share, bool is_signed) {
-  if (!std::isfinite(share)) return "none";
-  return is_signed ? fmt::format("{:+.1f} %", 100.0 * share) : fmt::format("{:.1f} %", 100.0 * share);
-}
-
-/// Text on the study of warping; empty if there is none.
-std::string warp_text(const Model& model) {
-  const WarpStudy& study = model.warp;
-  if (!study.any()) return "";
-  std::string text = fmt::format("  warping           {}\n", range_text(study));
-  text += fmt::format("    loaded          {} node{} along ({:.3f}, {:.3f}, {:.3f})\n", study.nodes.size(),
-                      study.nodes.size() == 1 ? "" : "s", study.direction.x(), study.direction.y(),
-                      study.direction.z());
-  text += "    rotation        small strain: force, displacement    warped: force, displacement\n";
-  for (std::size_t k = 0; k < study.rotation.size(); ++k) {
-    text += fmt::format(
-        "    {:5.1f} deg       {:>12} {:>12} {:>21} {:>12}\n", 180.0 / std::numbers::pi * study.rotation[k],
-        percent_text(study.linear.force[k], true), percent_text(study.linear.displacement[k], false),
-        percent_text(study.warped.force[k], true), percent_text(study.warped.displacement[k], false));
-  }
-  return text;
-}
-
 /// Text on damping a M + b K.
 std::string damping_text(const Rayleigh& damping) {
   if (damping.mass == 0.0 && damping.stiffness == 0.0) return "no damping";
@@ -224,7 +198,6 @@ std::string inspect(const Model& model) {
   }
   text += overlay_text(model);
   text += dynamics_text(model);
-  text += warp_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());
   text += fmt::format("  edges             {:.4g} to {:.4g} m\n", q.min_edge, q.max_edge);
   text += fmt::format("  {:17} {:.2f} to {:.2f} deg\n", plane ? "corner angles" : "dihedral angles",

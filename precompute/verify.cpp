@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <utility>
 
 #include "base/printable.h"
 #include "formats/model_check.h"
@@ -19,14 +18,11 @@
 #include "precompute/verify_description.h"
 #include "precompute/verify_dynamics.h"
 #include "precompute/verify_matrix.h"
-#include "precompute/warping/warp_study.h"
 
 namespace palpate {
 namespace {
 
 using Vector = Eigen::VectorXd;
-
-constexpr double warp_bound = 1e-3;  // searched values are found to 1e-5, by steps that rounding may change
 
 /// A f, for A as stored.
 template <class T>
@@ -195,23 +191,6 @@ Check check_rest_state(const Model& model, const Stiffness& stiffness) {
   return {"rest state", r.lpNorm<Eigen::Infinity>() / scale, 1e-8 + rounding};
 }
 
-/// Checks a study of warping against a new one under the same forces.
-Check check_warp_study(const Model& model) {
-  const WarpStudy &stored = model.warp, found = repeat_warp_study(model);
-  Check check{"warping", found.force.size() == stored.force.size() ? 0.0 : 1.0, warp_bound};
-  const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
-    for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k)
-      if (a[k] != b[k]) check.error = std::max(check.error, std::abs(a[k] - b[k]));
-  };
-  compare(stored.rotation, found.rotation);
-  for (const auto& [a, b] :
-       {std::pair(&stored.linear, &found.linear), std::pair(&stored.warped, &found.warped)}) {
-    compare(a->force, b->force);
-    compare(a->displacement, b->displacement);
-  }
-  return check;
-}
-
 /// Contents of the file that match neither its description nor its HDF5 part.
 std::vector<std::string> differences_of(const Model& model, const std::filesystem::path& file) {
   std::vector<std::string> differences = description_differences(model, file);
@@ -256,7 +235,6 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
   }
   add({check_rest_state(model, stiffness)});
   if (model.dynamics.method != DynamicsMethod::none) add(verify_dynamics(model, stiffness, samples));
-  if (model.warp.any()) add({check_warp_study(model)});
   for (const Check& check : report.checks) {
     if (model.compressed == nullptr && check.name.ends_with("touches") && check.error > good_force_error) {
       report.warnings.push_back(

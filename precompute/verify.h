@@ -27,8 +27,6 @@ struct VerifyReport {
 ///   |K u - e|_max / (|K|_inf |u|_max + 1);
 /// - rest state: K u0 = f on the free dofs, held ones as prescribed: |K u0 - f|_max / |f|_max;
 /// - dynamics: see verify_dynamics;
-/// - a study of warping against a new one under the same forces: the largest difference of rotations and
-/// errors;
 /// - all fields determined by /model_toml and the mesh: see description_differences;
 /// - the index against the metadata of HDF5: see is_index_right.
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples = 12);

@@ -16,7 +16,6 @@
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/overlay_regions.h"
 #include "precompute/verify_matrix.h"
-#include "precompute/warping/loaded_part.h"
 
 namespace palpate {
 namespace {
@@ -49,7 +48,6 @@ class DescriptionComparison {
     compare_loads();
     compare_overlay();
     compare_dynamics();
-    compare_warp();
     return std::move(differences_);
   }
 
@@ -161,15 +159,6 @@ class DescriptionComparison {
     compare("/dynamics/damping", damping(stored.damping), damping(asked.damping));
     if (asked.modes && stored.method == DynamicsMethod::modal)
       compare("the number of modes", stored.modes(), *asked.modes);
-  }
-
-  void compare_warp() {
-    compare("/warp", model_.warp.any(), asked_.warp.has_value());
-    if (!asked_.warp || !model_.warp.any()) return;
-    if (const auto& direction = asked_.warp->direction; direction)
-      same_rows("/warp/direction", std::vector<Vec3>{model_.warp.direction}, {direction->normalized()});
-    if (!asked_.warp->where || !by_tag(*asked_.warp->where))
-      same_rows("/warp/nodes", model_.warp.nodes, loaded_nodes(model_, asked_.warp->where, "/model_toml"));
   }
 
   template <class T>

@@ -38,9 +38,6 @@ sphere = {center = [0.5, 0.5, 1], radius = 0.1}
 method = "modal"
 time_step = 0.001
 modes = 3
-[warp]
-angle = 20
-levels = 2
 """
 SCRIPT = "t,x,y,z\n0,0.5,0.5,1.3\n%s,0.5,0.5,1.05\n"
 TOOL = ["--tool", "sphere:0.2"]

@@ -41,14 +41,12 @@ void write_field(hdf5::File& file, const Field<T>& field, const Model& model, co
   file.write_attribute(field.path, "xxh3", checksum_of(values));
 }
 
-/// Datasets known before the Green's functions, including those of overlays, dynamics and [warp] if there are
-/// any.
+/// Datasets known before the Green's functions, including those of overlays and dynamics if there are any.
 template <class Visitor>
 void for_each_known_field(const Model& model, Visitor&& visit) {
   for_each_body_field(model.mesh.element, visit);
   if (model.overlay.refinement != 0) for_each_overlay_field(visit);
   if (model.dynamics.method != DynamicsMethod::none) for_each_dynamics_field(model, visit);
-  if (model.warp.any()) for_each_warp_field(visit);
   if (model.greens.smooth() != nullptr) for_each_smooth_field(model, visit);
   if (model.force_errors.any()) visit_greens_errors(visit);
   if (model.dynamics.force_errors.any()) visit_inverse_errors(visit);
@@ -307,7 +305,6 @@ std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, 
   const auto exchange = [&] {  // by field: others refer to the mesh and the rest of the model
     std::swap(model.rest_displacement, begun->model.rest_displacement);
     std::swap(model.dynamics, begun->model.dynamics);
-    std::swap(model.warp, begun->model.warp);
     std::swap(model.greens, begun->model.greens);
     std::swap(model.force_errors, begun->model.force_errors);
   };

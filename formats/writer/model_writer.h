@@ -134,10 +134,9 @@ class ModelWriter {
 };
 
 /// Takes over all that an interrupted run of the same model computed with a factor (rest displacements,
-/// dynamics, a study of warping, force errors, smooth parts) from its PATH.partial, and returns its
-/// precision. Nullopt if there is none of the same model: all else must be equal, and the data taken over
-/// undamaged. A factor over several processes does not reproduce the last digits, and columns depend on its
-/// smooth part.
+/// dynamics, force errors, smooth parts) from its PATH.partial, and returns its precision. Nullopt if there
+/// is none of the same model: all else must be equal, and the data taken over undamaged. A factor over
+/// several processes does not reproduce the last digits, and columns depend on its smooth part.
 std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, Model& model);
 
 }  // namespace palpate

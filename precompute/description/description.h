@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <variant>
@@ -132,15 +131,6 @@ struct DynamicsOptions {
   std::string place;           ///< place of `modes`, else of the table: file, line and column, for errors
 };
 
-/// Options of a study of the rotation up to which small strain and warping are accurate.
-struct WarpOptions {
-  std::optional<Selection> where;         ///< loaded nodes; empty: the free end
-  std::optional<Vec3> direction;          ///< of the force at rest; empty: the direction of least stiffness
-  double angle = 0.5 * std::numbers::pi;  ///< rotation of the surface at which the study ends [rad]
-  Index levels = 12;                      ///< approximate number of forces until then
-  std::string place;                      ///< place of the table: file, line and column, for errors
-};
-
 /// Storage form of the Green's functions.
 enum class StorageForm : std::uint8_t {
   automatic,   ///< compressed if there are many stored nodes
@@ -168,7 +158,6 @@ struct Description {
   double tolerance = 0.005;  ///< compressed: largest allowed force error, relative to the largest force [-]
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
-  std::optional<WarpOptions> warp;
 };
 
 }  // namespace palpate

@@ -1,16 +1,10 @@
 #include <fmt/format.h>
 
-#include <numbers>
-
 #include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
-constexpr double most_warp_angle = 150.0;  // [degree]
-constexpr Index most_warp_levels = 200;
 
 /// Reads axes: bit `axis` is set for each letter.
 std::uint8_t read_axes(const TomlTable& entry, int dimension) {
@@ -69,12 +63,13 @@ Load read_load(const TomlTable& entry, int dimension) {
   return ConcentratedForce{value, where};
 }
 
-}  // namespace
-
+/// Keys of a table together with those of selections.
 Keys with_selections(Keys keys) {
   keys.insert(keys.end(), selection_kinds.begin(), selection_kinds.end());
   return keys;
 }
+
+}  // namespace
 
 std::vector<Fixing> read_fixed(const TomlTable& root, int dimension) {
   const std::string hint = dimension == 3
@@ -127,36 +122,6 @@ std::vector<Load> read_loads(const TomlTable& root, int dimension) {
     result.push_back(read_load(entry, dimension));
   }
   return result;
-}
-
-WarpOptions read_warp(const TomlTable& warp, int dimension) {
-  WarpOptions options;
-  if (const std::string_view kind = warp.at_most_one_of(selection_kinds); !kind.empty())
-    options.where = read_selection(warp, kind, dimension);
-  if (warp.has("direction")) {
-    options.direction = read_vector(warp, "direction", dimension);
-    if (options.direction->isZero(0.0)) {
-      warp.fail(
-          "direction", "[warp] direction is the zero vector",
-          "give the direction of the force, or leave it out for that along which the part gives way most");
-    }
-  }
-  const double degrees = warp.positive("angle", options.angle / degree);
-  if (degrees > most_warp_angle) {
-    warp.fail("angle",
-              fmt::format("[warp] angle is {}, and must be at most {} degrees", shown(degrees),
-                          shown(most_warp_angle)),
-              "beyond it a force no longer says how far a body has bent");
-  }
-  options.angle = degrees * degree;
-  if (warp.has("levels")) options.levels = warp.count("levels");
-  if (options.levels > most_warp_levels) {
-    warp.fail("levels",
-              fmt::format("[warp] levels is {}, and must be at most {}", options.levels, most_warp_levels),
-              "each level takes some factorisations");
-  }
-  options.place = warp.place_of("");
-  return options;
 }
 
 }  // namespace palpate

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numbers>
 
 #include "precompute/description/description.h"
 
@@ -27,8 +26,7 @@ KeyTable top_level() {
        {"load", "", "none", "list of tables: forces that act all the time"},
        {"storage", "", "defaults", "table: what is kept in the file, and how precisely"},
        {"overlay", "", "none", "table: overlays that are condensed offline"},
-       {"dynamics", "", "none", "table: free vibration of a body that was let go"},
-       {"warp", "", "none", "table: a study of how far the body may turn; may be empty"}}};
+       {"dynamics", "", "none", "table: free vibration of a body that was let go"}}};
 }
 
 KeyTable geometry() {
@@ -245,16 +243,6 @@ KeyTable damping() {
            {"frequencies", "Hz", "", "... at two frequencies `[f1, f2]`, from which a, b ≥ 0 must follow"}}};
 }
 
-KeyTable warp() {
-  const WarpOptions usual;
-  return {"[warp]",
-          {{"direction", "", "along which the part gives way most",
-            "of the force at rest; it turns with the part"},
-           {"angle", "degree", shown(usual.angle * 180.0 / std::numbers::pi),
-            "largest rotation of the surface at which the study ends, up to 150"},
-           {"levels", "", shown(usual.levels), "levels of the force until then, about; up to 200"}}};
-}
-
 const KeyTable& table_of(std::string_view title) {
   return *std::ranges::find(key_tables(), title, &KeyTable::title);
 }
@@ -263,10 +251,10 @@ const KeyTable& table_of(std::string_view title) {
 
 const std::vector<KeyTable>& key_tables() {
   static const std::vector<KeyTable> tables = {
-      top_level(),     geometry(),      box(),      cylinder(),  sphere(),     rectangle(),
-      polygon(),       mesh(),          material(), selection(), select_box(), select_half_space(),
-      select_sphere(), select_lowest(), fixed(),    load(),      storage(),    overlay(),
-      dynamics(),      damping(),       warp()};
+      top_level(),  geometry(),          box(),           cylinder(),      sphere(),
+      rectangle(),  polygon(),           mesh(),          material(),      selection(),
+      select_box(), select_half_space(), select_sphere(), select_lowest(), fixed(),
+      load(),       storage(),           overlay(),       dynamics(),      damping()};
   return tables;
 }
 

@@ -40,10 +40,6 @@ std::vector<Fixing> read_fixed(const TomlTable& root, int dimension);
 OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers);
 /// Reads [dynamics], for the scope of [storage].
 DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope);
-/// Reads [warp], a table with `keys_of("[warp]")` and the kinds of selections.
-WarpOptions read_warp(const TomlTable& warp, int dimension);
-/// Keys of a table together with those of selections.
-Keys with_selections(Keys keys);
 /// Reads all of [[load]], possibly none.
 std::vector<Load> read_loads(const TomlTable& root, int dimension);
 

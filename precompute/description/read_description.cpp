@@ -60,7 +60,7 @@ void check_without_greens(const TomlTable& root, const TomlTable& storage) {
                    fmt::format("[storage] {} is about Green's functions, and scope \"none\" keeps none", key),
                    fmt::format("remove {}, or set another scope", key));
   }
-  for (const char* key : {"overlay", "dynamics", "warp"}) {
+  for (const char* key : {"overlay", "dynamics"}) {
     if (root.has(key))
       root.fail(key, fmt::format("[{}] needs Green's functions, and scope \"none\" keeps none", key),
                 fmt::format("remove [{}], or set another scope in [storage]", key));
@@ -200,8 +200,6 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   if (root.has("dynamics")) {
     result.dynamics = read_dynamics(root.table("dynamics", keys_of("[dynamics]")), result.scope);
   }
-  if (root.has("warp"))
-    result.warp = read_warp(root.table("warp", with_selections(keys_of("[warp]"))), dimension);
   return result;
 }
 

@@ -218,7 +218,6 @@ void for_node_lists(const Description& description, const Work& work) {
   if (description.overlay) {
     for (const Selection& where : description.overlay->regions) note("[[overlay.region]]", where);
   }
-  if (description.warp && description.warp->where) note("[warp]", *description.warp->where);
 }
 
 /// Reports lists of nodes that also select middles of edges.

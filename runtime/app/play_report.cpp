@@ -11,7 +11,7 @@
 #include "base/program.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/background/live_motion.h"
-#include "runtime/background/warped_motion.h"
+#include "runtime/background/two_level_motion.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/mesh_stiffening.h"
 #include "runtime/loop/output.h"
@@ -174,17 +174,16 @@ void warn_of_places(const PlayedRun& run) {
   }
 }
 
-constexpr double most_warp_residual = 1e-3;  // largest one that is not reported
+constexpr double most_residual = 1e-3;  // largest one that is not reported
 
-void print_warp(const WarpTelling& warp) {
-  say(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
-      degrees_a_radian * warp.largest_rotation, warp.turns);
-  if (warp.last_residual > most_warp_residual)
-    print_warning(
-        fmt::format("at the end the warped body was not in balance: its next step would have changed "
-                    "it by {:.2g} of its displacement. Its forces bend it further than --warp knows, or "
-                    "it was still moving",
-                    warp.last_residual));
+void print_depth(const DepthTelling& depth) {
+  say(stderr, "depth: the body turned by up to {:.3g} degrees, its compliance {} times\n",
+      degrees_a_radian * depth.largest_rotation, depth.turns);
+  if (depth.last_residual > most_residual)
+    print_warning(fmt::format(
+        "at the end the body was not in balance: its next step would have changed it by {:.2g} of "
+        "its coarse displacement, or it was still moving",
+        depth.last_residual));
 }
 
 void print_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
@@ -213,8 +212,8 @@ const LiveMotion* PlayedRun::live() const {
   return motion != nullptr ? dynamic_cast<const LiveMotion*>(&motion->stepper()) : nullptr;
 }
 
-const WarpedMotion* PlayedRun::warped() const {
-  return motion != nullptr ? dynamic_cast<const WarpedMotion*>(&motion->stepper()) : nullptr;
+const TwoLevelMotion* PlayedRun::deep() const {
+  return motion != nullptr ? dynamic_cast<const TwoLevelMotion*>(&motion->stepper()) : nullptr;
 }
 
 void print_report(const PlayedRun& run) {
@@ -232,7 +231,7 @@ void print_report(const PlayedRun& run) {
         1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (const LiveMotion* live = run.live()) print_live(run.body, live->telling(), run.report);
-  if (const WarpedMotion* warped = run.warped()) print_warp(warped->telling());
+  if (const TwoLevelMotion* deep = run.deep()) print_depth(deep->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }

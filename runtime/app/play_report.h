@@ -16,7 +16,7 @@ namespace palpate {
 constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
 
 class LiveMotion;
-class WarpedMotion;
+class TwoLevelMotion;
 
 /// Run and its parts; the pointers may be null.
 struct PlayedRun {
@@ -35,7 +35,7 @@ struct PlayedRun {
   std::optional<Error> recording_failure = {};  ///< reason if the recording is incomplete
 
   [[nodiscard]] const LiveMotion* live() const;      ///< of `motion`, null where it is another
-  [[nodiscard]] const WarpedMotion* warped() const;  ///< likewise
+  [[nodiscard]] const TwoLevelMotion* deep() const;  ///< likewise
 };
 
 /// Prints a few lines for a person, and warnings, to the error stream.

@@ -11,11 +11,11 @@
 #include "runtime/app/best_effort_report.h"
 #include "runtime/app/play_report.h"
 #include "runtime/background/live_motion.h"
-#include "runtime/background/warped_motion.h"
+#include "runtime/background/two_level_motion.h"
+#include "runtime/depth/studied_range.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/last_tick.h"
 #include "runtime/loop/output.h"
-#include "runtime/warp/studied_range.h"
 #include "statics/surface_change.h"
 
 namespace palpate {
@@ -76,12 +76,12 @@ std::string_view name_of(DynamicsMethod method) {
   return method == DynamicsMethod::packed ? "packed" : "modal";
 }
 
-Json json_warp(const WarpTelling& warp) {
-  return {{"largest_rotation_deg", degrees_a_radian * warp.largest_rotation},
-          {"last_rotation_deg", degrees_a_radian * warp.last_rotation},
-          {"compliance_turns", warp.turns},
-          {"steps_unbalanced", warp.unbalanced},
-          {"last_residual", warp.last_residual}};
+Json json_depth(const DepthTelling& depth) {
+  return {{"largest_rotation_deg", degrees_a_radian * depth.largest_rotation},
+          {"last_rotation_deg", degrees_a_radian * depth.last_rotation},
+          {"compliance_turns", depth.turns},
+          {"steps_unbalanced", depth.unbalanced},
+          {"last_residual", depth.last_residual}};
 }
 
 Json json_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
@@ -107,10 +107,10 @@ Json json_live(const Body& body, const LiveTelling& live, const LoopReport& repo
 }
 
 Json json_dynamics(const Body& body, const MotionSource* motion) {
-  const bool is_warped = body.contact_model() == ContactModel::warped;
-  const bool is_dynamic = !is_warped && body.contact_model() != ContactModel::quasi_static;
+  const bool is_deep = body.contact_model() == ContactModel::two_level;
+  const bool is_dynamic = !is_deep && body.contact_model() != ContactModel::quasi_static;
   Json json = {{"method", body.live() != nullptr ? "live"
-                          : is_warped            ? "none"
+                          : is_deep              ? "none"
                                                  : name_of(body.model().dynamics.method)},
                {"contact", is_dynamic ? "dynamic" : "quasi-static"}};
   if (motion != nullptr) {
@@ -240,7 +240,7 @@ std::string json_report(const PlayedRun& run) {
   if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay);
   json["dynamics"] = json_dynamics(run.body, run.motion);
   if (const LiveMotion* live = run.live()) json["live"] = json_live(run.body, live->telling(), run.report);
-  if (const WarpedMotion* warped = run.warped()) json["warp"] = json_warp(warped->telling());
+  if (const TwoLevelMotion* deep = run.deep()) json["depth"] = json_depth(deep->telling());
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();
     json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();

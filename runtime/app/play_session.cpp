@@ -45,7 +45,7 @@ void warn_of_slow_steps(const Body& body) {
   print_warning(fmt::format(
       "a step of {:.3g} ms takes {:.0f} ms here: the body moves {:.2g} times slower than real time and feels "
       "stiffer than it is; give it a larger edge_length, a longer --live-step or --step-solver cg, leave out "
-      "--solver (or take --warp yes), or let it take its time by --fast",
+      "--solver (or take --depth yes), or let it take its time by --fast",
       1e3 * step, 1e3 * taken, taken / step));
 }
 

@@ -6,9 +6,9 @@
 #include "meshes/element_type.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"
+#include "runtime/depth/studied_range.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/viewer/run_words.h"
-#include "runtime/warp/studied_range.h"
 
 namespace palpate {
 namespace {
@@ -90,7 +90,7 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"size", body.bounds().diagonal().norm()},
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
           {"moves",
-           model.dynamics.method != DynamicsMethod::none && body.contact_model() != ContactModel::warped},
+           model.dynamics.method != DynamicsMethod::none && body.contact_model() != ContactModel::two_level},
           {"loads", has_loads(model)},
           {"materials", youngs_moduli(model)},
           {"studied_rotation", number_or_null(studied_rotation(body))},

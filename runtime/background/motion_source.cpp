@@ -5,7 +5,7 @@
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/packed_motion.h"
-#include "runtime/background/warped_motion.h"
+#include "runtime/background/two_level_motion.h"
 #include "runtime/core/tick/surface_motion.h"
 
 namespace palpate {
@@ -22,7 +22,7 @@ int processors_beside_the_tick() {
 
 std::unique_ptr<MotionStepper> make_stepper(const Body& body, int jobs) {
   if (body.live() != nullptr) return std::make_unique<LiveMotion>(body);
-  if (body.contact_model() == ContactModel::warped) return std::make_unique<WarpedMotion>(body);
+  if (body.contact_model() == ContactModel::two_level) return std::make_unique<TwoLevelMotion>(body);
   return std::make_unique<PackedMotion>(body, jobs);
 }
 
@@ -60,7 +60,8 @@ void MotionSource::receive(State& state) noexcept {
 
 void MotionSource::take(State& state) noexcept {
   const MotionSample& sample = samples_.read();
-  if (state.surface.motion.receive(sample)) change_compliance(body_, state.surface, sample.compliance);
+  if (state.surface.motion.receive(sample))
+    change_compliance(body_, state.surface, sample.compliance, sample.shift);
 }
 
 void MotionSource::note_standing_still(State& state) noexcept {
@@ -121,6 +122,7 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
   sample.compliance = stepper_->compliance();
   stepper_->tell_untouched(sample.untouched);
+  stepper_->tell_shift(sample.shift);
   let_go_done_ = job.let_go;
   samples_.publish();
   ++steps_;

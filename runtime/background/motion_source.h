@@ -1,4 +1,4 @@
-// Steps packed dynamics, or a live or warped body, beside the tick.
+// Steps packed dynamics, or a body that is live or on two levels, beside the tick.
 #pragma once
 
 #include <atomic>
@@ -20,13 +20,13 @@ struct MotionSourceOptions {
   int jobs = 0;               ///< threads for multiplying; 0: one per processor but one
 };
 
-/// Performs the jobs of a state's FreeMotion for a live or warped body or packed dynamics: call `post` after
-/// each tick, `receive` before the next one. In the background neither waits: a step that is late is received
-/// later, and the body's time stands still in between.
+/// Performs the jobs of a state's FreeMotion for a body that is live or on two levels or for packed dynamics:
+/// call `post` after each tick, `receive` before the next one. In the background neither waits: a step that
+/// is late is received later, and the body's time stands still in between.
 class MotionSource {
  public:
   /// `body` must outlive this; `state` is the loop's state or a copy. Throws Error unless the body is live or
-  /// warped, or its dynamics are packed.
+  /// on two levels, or its dynamics are packed.
   MotionSource(const Body& body, const State& state, const MotionSourceOptions& options);
   ~MotionSource();
   MotionSource(const MotionSource&) = delete;

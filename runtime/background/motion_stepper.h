@@ -24,6 +24,8 @@ class MotionStepper {
   virtual void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept = 0;
   /// Writes MotionSample::untouched to `u`.
   virtual void tell_untouched(std::vector<double>& u) const noexcept { u.clear(); }
+  /// Writes MotionSample::shift to `shift`.
+  virtual void tell_shift(std::vector<double>& shift) const noexcept { shift.clear(); }
   /// Compliance for contact forces, whose effect is added to u; null: the body's Green's functions.
   [[nodiscard]] virtual std::shared_ptr<const Greens> compliance() const noexcept { return nullptr; }
 };

@@ -13,7 +13,7 @@
 namespace palpate {
 
 /// True if a picture follows from the contact forces alone: the body is displaced by its Green's functions,
-/// without dynamics, warp or the patches of an overlay.
+/// without dynamics, depth or the patches of an overlay.
 [[nodiscard]] bool pictures_follow_from_contacts(const Body& body) noexcept;
 
 /// Leaves what a recording has of a picture: the surface of the body's own mesh where tools meet a finer one

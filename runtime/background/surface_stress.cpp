@@ -89,7 +89,7 @@ void spread_middles(std::span<const Index> nodes, std::vector<std::uint8_t>& don
 
 bool parts_turn(const Body& body) noexcept {
   if (body.live() != nullptr) return body.live()->body.options().law != LiveLaw::linear;
-  return body.contact_model() == ContactModel::warped;
+  return body.contact_model() == ContactModel::two_level;
 }
 
 SurfaceStress::SurfaceStress(const Body& body)

@@ -26,11 +26,11 @@ bool parts_turn(const Body& body) noexcept;
 /// It is evaluated at the nodes of each facet and averaged there with the facets' areas as weights; a facet's
 /// stress depends on the facet alone, not on the volume behind it. At edges each facet has the traction of
 /// its own side (SideTractions), so that a uniform stress is found exactly there too. Small strain: normals
-/// and areas are those of the mesh. For a body whose parts rotate (warped, or live with any but the linear
-/// law) the stress and forces of a node are in the frame rotated with the facets around it; von Mises stress
-/// is the same in any frame. Facets whose nodes are all held along some axis have an unknown traction and do
-/// not count. The weight of the body is not a traction: it is treated like the weight carried by interior
-/// nodes.
+/// and areas are those of the mesh. For a body whose parts rotate (on two levels, or live with any but the
+/// linear law) the stress and forces of a node are in the frame rotated with the facets around it; von Mises
+/// stress is the same in any frame. Facets whose nodes are all held along some axis have an unknown traction
+/// and do not count. The weight of the body is not a traction: it is treated like the weight carried by
+/// interior nodes.
 class SurfaceStress {
  public:
   /// `body` must outlive this.

@@ -190,7 +190,8 @@ Body::Made Body::make(Model model, const GreensOptions& options, int refinement,
   parts.simplices = fine.simplices;
   for (const Index element : fine.element)
     parts.friction.push_back(model.materials[model.material_of_element[element]].friction);
-  const bool is_local = local && is_even(model) && contact == ContactModel::quasi_static;
+  const bool is_static = contact == ContactModel::quasi_static || contact == ContactModel::two_level;
+  const bool is_local = local && is_even(model) && is_static;
   return {std::move(parts), std::move(model),    std::move(stored_of_mesh),
           std::move(fine),  std::move(rounding), is_local};
 }

@@ -19,9 +19,9 @@
 #include "formats/model_file.h"
 #include "matrices/hierarchical.h"
 #include "runtime/body/scaled_model.h"
+#include "runtime/depth/deep_model.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
-#include "runtime/warp/warped_model.h"
 
 namespace palpate {
 namespace {
@@ -49,15 +49,14 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
-/// Refuses settings that a warped body does not support.
-void check_warp(const BodyOptions& options) {
+/// Refuses settings that a body on two levels does not support.
+void check_depth(const BodyOptions& options) {
   const auto refuse = [](const char* why, const char* option) {
-    throw Error(why, option, std::string("leave out ") + option + " or --warp");
+    throw Error(why, option, std::string("leave out ") + option + " or --depth");
   };
-  if (options.live.solver)
-    refuse("a live solver turns by itself, and has no Green's functions to warp", "--solver");
-  if (options.has_overlays()) refuse("overlays are of the body at rest, and do not turn", "--overlay");
-  if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
+  if (options.live.solver) refuse("a live solver turns by itself, and has no Green's functions", "--solver");
+  if (options.has_overlays()) refuse("patches are of the body at rest, and do not turn", "--overlay");
+  if (options.contact == ContactModel::dynamic) refuse("a body on two levels has no inertia", "--contact");
 }
 
 /// Checks that a model fits neo-Hookean overlays, and drops the data that they do not use.
@@ -105,7 +104,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     warn_once(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
-  if (options.warp) check_warp(options);
+  if (options.depth) check_depth(options);
   if (options.overlay_law != PatchLaw::linear) prepare_for_law(model, options);
   if (options.live.solver) {
     if (options.has_overlays()) {
@@ -122,10 +121,9 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   }
   if (const std::string warning = rest_warning(model); !warning.empty())
     warn_once(file.string() + ": " + warning);
-  if (options.warp) {
-    return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
-  }
   const MetSurface met = met_surface(model, options);
+  if (options.depth)
+    return Body(deep_model(std::move(model)), {}, met.refinement, ContactModel::two_level, met.is_local);
   return Body(std::move(model), {}, met.refinement, options.contact, met.is_local);
 }
 

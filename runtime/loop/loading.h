@@ -23,7 +23,7 @@ struct BodyOptions {
   double load_scale = 1.0;  ///< see scale_loads
   double stiffness_scale = 1.0;
   LiveSettings live{};
-  bool warp = false;  ///< Green's functions rotate with the body, see SurfaceWarp
+  bool depth = false;  ///< on two levels, see TwoLevels
 
   [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || graded; }
   bool operator==(const BodyOptions&) const = default;

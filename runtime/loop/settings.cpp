@@ -260,11 +260,12 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                 s.overlay.has_patches()},
         s.overlay_memory);
   visit(
-      Setting{"warp", group, "yes|no", "", "no",
-              "parts of the body that turn take their stiffness with them: for bodies that bend far, without "
-              "a solver",
-              any_number, s.warp},
-      s.warp);
+      Setting{
+          "depth", group, "yes|no", "", "no",
+          "presses as deep as a hand's: the body turns and bends far, by a coarse body of large strain under "
+          "its Green's functions",
+          any_number, s.depth},
+      s.depth);
 }
 
 /// Visits the settings of the live solver.
@@ -370,7 +371,7 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
   auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_law,
-         overlay_memory, warp, live, rate, motion_scale, force_scale, origin, axes, safety] = settings;
+         overlay_memory, depth, live, rate, motion_scale, force_scale, origin, axes, safety] = settings;
   for_each_tool_setting(tool, visit);
   visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
                 "a grab that touches nothing takes hold of the nearest surface within this distance of the "

@@ -33,7 +33,7 @@ struct Settings {
   OverlayOptions overlay;
   PatchLaw overlay_law = PatchLaw::linear;
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
-  bool warp = false;                                         ///< Green's functions rotate with the body
+  bool depth = false;                                        ///< the body on two levels
   LiveSettings live;                                         ///< a solver in place of Green's functions
   std::int64_t rate = 1000;                                  ///< ticks per second
   double motion_scale = 1.0;                                 ///< see WorkspaceOptions

@@ -27,8 +27,7 @@ WorkspaceOptions Settings::workspace() const {
 
 BodyOptions Settings::body() const {
   // A capsule or disc touches faces and edges as well: of a fine surface far too many.
-  const bool is_possible =
-      has_point_core(tool) && contact == ContactModel::quasi_static && !live.solver && !warp;
+  const bool is_possible = has_point_core(tool) && contact == ContactModel::quasi_static && !live.solver;
   const bool by_radius =
       overlay.kind == OverlayKind::graded ||
       (overlay.kind == OverlayKind::local && is_possible && overlay_law == PatchLaw::linear);
@@ -40,7 +39,7 @@ BodyOptions Settings::body() const {
           .load_scale = load_scale,
           .stiffness_scale = stiffness_scale,
           .live = live,
-          .warp = warp};
+          .depth = depth};
 }
 
 Tool parse_shape(const std::string& text) {

@@ -78,27 +78,27 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   assert.deepEqual(page.complaints, []);
 });
 
-test('warp is turned on and off, and keeps out what it has no place for', async (t) => {
+test('depth is turned on and off, and keeps out what it has no place for', async (t) => {
   const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 2\n', args: ['--tool', 'sphere:0.1'] });
   const studied = async () => (180 / Math.PI) * (await told(page, 'state')).model.studied_rotation;
   near(await studied(), 19, 0.01, 'range of small strain');
-  const turn = async (name, value) => {
+  const turn = async (name, value, key = name) => {
     await part(page, name).click();
-    await until(page, ([key, now]) => (window.palpate.state.settings[key] ?? null) === now && !window.palpate.state.busy, [name, value]);
+    await until(page, ([key, now]) => (window.palpate.state.settings[key] ?? null) === now && !window.palpate.state.busy, [key, value]);
     await until(page, () => window.palpate.ready);
   };
-  await turn('warp', 'yes');
-  near(await studied(), 90, 0.01, 'range of a warped body');
+  await turn('two-levels', 'yes', 'depth');
+  near(await studied(), 90, 0.01, 'range of two levels');
   assert.equal(await part(page, 'overlay').isDisabled(), true);
-  assert.match(await part(page, 'overlay').getAttribute('title'), /warped/);
+  assert.match(await part(page, 'overlay').getAttribute('title'), /Not with depth/);
   await choose(page, 'press', 0.02);
   const felt = await pressed(page, top);
   assert.ok(felt.force[2] < 0, `it pushes the body down: ${felt.force}`);
-  await turn('warp', null);
+  await turn('two-levels', null, 'depth');
   near(await studied(), 19, 0.01, 'range of small strain again');
   await turn('overlay', 'r=3,rings=2');
-  assert.equal(await part(page, 'warp').isDisabled(), true);
-  assert.match(await part(page, 'warp').getAttribute('title'), /Not with overlay/);
+  assert.equal(await part(page, 'two-levels').isDisabled(), true);
+  assert.match(await part(page, 'two-levels').getAttribute('title'), /Not with overlay/);
   assert.deepEqual(page.complaints, []);
 });
 
@@ -116,7 +116,7 @@ test('a live body has settings of its own, which are taken and refused with a re
   assert.equal(await part(page, 'gravity').inputValue(), '0,0,-9.81');
   assert.equal(await part(page, 'yield').inputValue(), 'inf');
   const taken = async (name, value) => {
-    await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [name, value]);
+    await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [key, value]);
     await until(page, () => window.palpate.ready);
   };
   for (const [name, value] of Object.entries({ yield: '0.05', creep: '20', 'most-plastic': '0.5', 'live-step': '0.01', 'mass-damping': '2', 'stiffness-damping': '0.01', 'wall-friction': '0.25', gravity: '0,0,-5', 'poissons-ratio': '0.45' })) {

@@ -162,7 +162,7 @@ TEST(DynamicsFile, MayBeWithoutThem) {
 TEST(DynamicsFile, EveryAlteredDatasetIsNamed) {
   for (const DynamicsMethod method : {packed, modal}) {
     const auto datasets = checked_datasets(good_file(method));
-    EXPECT_EQ(datasets.size(), method == packed ? 49U : 46U);
+    EXPECT_EQ(datasets.size(), method == packed ? 43U : 40U);
     for (const std::string& dataset : datasets) {
       const Folder folder;
       std::filesystem::copy_file(good_file(method), folder / "x.hdf");

@@ -419,52 +419,6 @@ const Edit edits[] = {
     {"ManyLayers",
      [](const Path& p) { set_integers(p, "layers", {std::int64_t{1} << 40}); },
      {"attribute layers is"}},
-    // study of warping
-    {"WarpWithoutForces", [](const Path& p) { remove_object(p, "/warp/force"); }, {"/warp/force is missing"}},
-    {"WarpWithoutLevels",
-     [](const Path& p) { replace(p, "/warp/force", H5T_IEEE_F64LE, {0}); },
-     {"/warp/force has 0 entries, at least 1"}},
-    {"WarpWithoutNodes",
-     [](const Path& p) { replace(p, "/warp/nodes", H5T_STD_I32LE, {0}); },
-     {"/warp/nodes has 0 entries, at least 1"}},
-    {"WarpErrorsOfOtherLevels",
-     [](const Path& p) {
-       replace(p, "/warp/linear", H5T_IEEE_F64LE, {2, 2});
-     },
-     {"/warp/linear has size 2, 3 is expected by /warp/force"}},
-    {"WarpNodeInside",
-     [](const Path& p) { set_entry(p, "/warp/nodes", 0, std::int32_t{13}); },
-     {"/warp/nodes: node 13 is not on the surface"}},
-    {"WarpNodeHeld",
-     [](const Path& p) { set_entry(p, "/warp/nodes", 0, std::int32_t{0}); },
-     {"/warp/nodes: node 0 is held"}},
-    {"WarpNodesTwice",
-     [](const Path& p) { set_entry(p, "/warp/nodes", 1, std::int32_t{9}); },
-     {"/warp/nodes does not ascend"}},
-    {"WarpNodeOutside",
-     [](const Path& p) { set_entry(p, "/warp/nodes", 1, std::int32_t{27}); },
-     {"/warp/nodes holds 27 (entry 1)"}},
-    {"WarpDirectionLong",
-     [](const Path& p) { set_entry(p, "/warp/direction", 0, 0.7); },
-     {"/warp/direction has the length 1.0630"}},
-    {"WarpForceFalls",
-     [](const Path& p) { set_entry(p, "/warp/force", 2, 1.0); },
-     {"/warp/force is not positive and ascending (entry 2)"}},
-    {"WarpForceNotFinite",
-     [](const Path& p) { set_entry(p, "/warp/force", 2, infinity); },
-     {"/warp/force holds a value that is not finite (entry 2)"}},
-    {"WarpRotationZero",
-     [](const Path& p) { set_entry(p, "/warp/rotation", 0, 0.0); },
-     {"/warp/rotation is not positive and ascending (entry 0)"}},
-    {"WarpRotationBeyond",
-     [](const Path& p) { set_entry(p, "/warp/rotation", 2, 3.2); },
-     {"/warp/rotation ends at 3.2"}},
-    {"WarpErrorNotANumber",
-     [](const Path& p) { set_entry(p, "/warp/warped", 3, nan); },
-     {"/warp/warped holds a value that is not finite (entry 3)"}},
-    {"WarpErrorImpossible",
-     [](const Path& p) { set_entry(p, "/warp/warped", 2, -1.5); },
-     {"/warp/warped: row 1 is -1.5"}},
     // overlays
     {"OverlayWithoutCentres",
      [](const Path& p) { remove_object(p, "/overlay/centres"); },
@@ -587,7 +541,7 @@ INSTANTIATE_TEST_SUITE_P(Files, HostilePlane, testing::ValuesIn(plane_edits),
 
 TEST(AlteredFile, EveryDatasetIsNamed) {
   const auto datasets = checked_datasets(good_file());
-  EXPECT_EQ(datasets.size(), 40U);
+  EXPECT_EQ(datasets.size(), 34U);
   for (const std::string& dataset : datasets) {
     const Folder folder;
     std::filesystem::copy_file(good_file(), folder / "x.hdf");
@@ -616,16 +570,6 @@ TEST(FileWithout, Overlays) {
   const Model read = load_model(folder / "x.hdf");
   EXPECT_EQ(read.overlay.refinement, 0);
   EXPECT_EQ(difference(load_model(good_file()), read), "overlay");
-}
-
-TEST(FileWithout, StudyOfWarping) {
-  const Folder folder;
-  std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  remove_object(folder / "x.hdf", "/warp");
-  reseal(folder / "x.hdf");
-  const Model read = load_model(folder / "x.hdf");
-  EXPECT_FALSE(read.warp.any());
-  EXPECT_EQ(difference(load_model(good_file()), read), "warp");
 }
 
 TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {

@@ -117,14 +117,12 @@ TEST(ModelFile, WithoutGreensFunctionsHoldsTheRest) {
   written.scope = Scope::none;
   Model storing = written;
   storing.overlay = {};
-  storing.warp = {};
   EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", storing, Precision::single_precision), Error);
   written.stored_nodes.clear();
   written.probes.clear();
   EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", written, Precision::single_precision),
                Error);  // overlays
   written.overlay = {};
-  written.warp = {};
   ModelWriter(folder / "a.palpate.hdf", written, Precision::single_precision).finish({});
   const Model read = load_model(folder / "a.palpate.hdf");
   EXPECT_EQ(read.scope, Scope::none);

@@ -84,11 +84,6 @@ def check_model(path, element, scalar):
         expect(packed.id.get_offset() % 4096 == 0, "page alignment")
         expect(file["/probes/forces"].shape == file["/probes/displacements"].shape == (2, n), "probes")
 
-        study = file["/warp"]
-        expect(set(study["nodes"]) <= set(surface.ravel()) & set(stored), "loaded nodes of the study of warping")
-        expect(list(study["direction"]) == [0.6, -0.8, 0] and list(study["force"]) == [0.5, 1.25, 2.5], "its load")
-        expect(np.array_equal(study["linear"], [[0.01, 0.02], [-0.2, 0.3], [np.inf, 4]]), "errors of small strain")
-        expect(study["warped"].shape == (3, 2) and list(study["rotation"]) == [0.1, 0.3, 0.9], "errors by rotation")
         overlay = file["/overlay"]
         expect((overlay["refinement"][0], overlay["rings"][0]) == (3, 2), "overlay")
         expect(list(overlay["nodes"]) == [2, 3] and list(overlay["surface_nodes"]) == [3, 1], "sizes of overlays")

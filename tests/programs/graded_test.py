@@ -145,7 +145,7 @@ class Ball(ProgramTest):
         self.assertNotIn("overlay", json.loads((self.folder / "report.json").read_text()))
 
     def test_what_it_cannot_go_with_is_refused(self):
-        for options, word in ((("--overlay-law", "neo-hookean"), "linear"), (("--warp", "yes"), "--warp"), (("--solver", "corotational"), "--solver")):
+        for options, word in ((("--overlay-law", "neo-hookean"), "linear"), (("--depth", "yes"), "--depth"), (("--solver", "corotational"), "--solver")):
             result = run(RUNTIME, "play", self.files["tet10"], "--device", f"script:{self.script}", "--fast", "--tool", "sphere:0.01", "--overlay", "graded",
                          *options)
             self.assertEqual(result.returncode, 1, result.stderr)

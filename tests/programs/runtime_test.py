@@ -504,7 +504,7 @@ class PlayOverlay(ProgramTest):
         self.assertEqual(run(RUNTIME, *press, "replay:out.mcap", cwd=self.folder).returncode, 0)
         result = run(RUNTIME, *press, f"script:{script}", "--overlay", "r=2,rings=1", cwd=self.folder)
         self.assertNotIn("neo_hookean", json.loads((self.folder / "report.json").read_text())["overlay"])
-        for options, named in (((*law[2:],), "--overlay-law"), ((*law, "--contact", "dynamic"), "--contact"), ((*law, "--warp", "yes"), "--overlay"),
+        for options, named in (((*law[2:],), "--overlay-law"), ((*law, "--contact", "dynamic"), "--contact"), ((*law, "--depth", "yes"), "--overlay"),
                                (("--overlay", "r=2,rings=1", "--overlay-law", "rubber"), "--overlay-law")):
             result = run(RUNTIME, *press, f"script:{script}", *options, cwd=self.folder)
             self.assertNotEqual(result.returncode, 0)

@@ -239,10 +239,10 @@ class Motion(Sample):
         self.assertLess(curves["corotational"][-1], 0.9 * curves["small"][-1])
         self.assertGreater(curves["neo"][-1], 1.1 * curves["small"][-1])
 
-    def test_warp(self):
-        folder, _ = self.sample("warp")
-        force = {name: numpy.linalg.norm(palpate.read(folder / f"{name}.mcap")["force"][-1]) for name in ("small", "warped", "live")}
-        self.assertAlmostEqual(force["warped"] / force["live"], 1, delta=0.06)
+    def test_depth(self):
+        folder, _ = self.sample("depth")
+        force = {name: numpy.linalg.norm(palpate.read(folder / f"{name}.mcap")["force"][-1]) for name in ("small", "depth", "live")}
+        self.assertAlmostEqual(force["depth"] / force["live"], 1, delta=0.06)
         self.assertGreater(abs(force["small"] / force["live"] - 1), 0.2)
 
 
@@ -340,13 +340,14 @@ FEATURES = {
     "Elements that do not lock.": ["elements", "nodule", "gravity", "plane"],
     "A fingertip feels the body, not its mesh.": ["overlay"],
     "Dynamics.": ["swing", "inertia"],
+    "Deep presses": ["depth"],
     "Live bodies": ["fall", "drawing", "deep"],
     "Devices.": ["device"],
     "Recordings": ["replay", "export"],
     "A C library": ["loop_c", "loop_cpp", "loop_csharp", "loop_thread"],
 }
-# Of other parts of README and the book: from a file to a body, what Python does, what the files are, large rotation.
-OTHERS = ["surface", "image", "arrays", "batch", "probe", "compress", "warp"]
+# Of other parts of README and the book: from a file to a body, what Python does, what the files are.
+OTHERS = ["surface", "image", "arrays", "batch", "probe", "compress"]
 
 
 class Page(ProgramTest):

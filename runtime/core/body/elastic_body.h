@@ -23,7 +23,7 @@ enum class ContactModel : std::uint8_t {
   quasi_static,  ///< stiffness alone: Xi
   dynamic,       ///< with inertia and viscosity: K_bar^-1 of one time step (theory.md section 5)
   live,          ///< live body: compliance of one of its steps, each several ticks long
-  warped,        ///< Xi rotated with the body, whose warp is computed beside the tick
+  two_level,     ///< Xi turned with a coarse body, whose balance is found beside the tick
 };
 
 /// Free surface node nearest to a point.

@@ -17,7 +17,7 @@ std::int64_t count_ticks(const ElasticBody& body, double tick) {
   if (!body.swings()) return 1;
   const double step = body.swing().newmark.time_step;
   const double ticks = std::round(step / tick);
-  if (body.contact_model() == ContactModel::warped)  // steps without a time of their own
+  if (body.contact_model() == ContactModel::two_level)  // steps without a time of their own
     return static_cast<std::int64_t>(std::max(1.0, ticks));
   const bool dynamic = body.contact_model() == ContactModel::dynamic;
   const bool fits = ticks >= 1.0 && std::abs(ticks * tick - step) <= 1e-9 * step;
@@ -135,7 +135,7 @@ FreeMotion::FreeMotion(const ElasticBody& body, double tick, Index most_loads)
       ticks_per_step_(count_ticks(body, tick)),
       decay_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
       dynamic_contact_(body.contact_model() != ContactModel::quasi_static),
-      active_(body.contact_model() == ContactModel::live || body.contact_model() == ContactModel::warped),
+      active_(body.contact_model() == ContactModel::live || body.contact_model() == ContactModel::two_level),
       phase_(ticks_per_step_),
       history_{.loads{}, .strains{}, .pending = make_let_go(dimension_, room(body, most_loads))},
       sampled_{.job{.release = make_let_go(dimension_, room(body, most_loads)),

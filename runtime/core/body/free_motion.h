@@ -41,9 +41,12 @@ struct MotionSample {
   std::int64_t step = 0;    ///< step of the job that it answers
   std::int64_t let_go = 0;  ///< number of releases included
   std::vector<double> u;    ///< [n] displacement without contact forces at the end of the next step [m]
-  /// Compliance for contact forces from then on, for a live or warped body; null: the body's Green's
-  /// functions.
+  /// Compliance for contact forces from then on, for a body that is live or on two levels; null: the body's
+  /// Green's functions.
   std::shared_ptr<const Greens> compliance{};
+  /// [n] displacement by the job's forces with the compliance before, less that with this one [m]; empty: not
+  /// known.
+  std::vector<double> shift{};
   /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
 };

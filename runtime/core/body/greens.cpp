@@ -268,6 +268,11 @@ std::shared_ptr<const Greens> unfold_or_fold(PackedGreens packed, const GreensOp
 
 }  // namespace
 
+const Mat3& Greens::rotation(Index) const noexcept {
+  static const Mat3 none = Mat3::Identity();
+  return none;
+}
+
 double Greens::rounding() const noexcept {
   return has_float_entries(precision_) ? double{std::numeric_limits<float>::epsilon()}
                                        : std::numeric_limits<double>::epsilon();

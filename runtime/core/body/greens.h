@@ -74,6 +74,8 @@ class Greens {
   /// Not for the tick: allocates.
   [[nodiscard]] Eigen::MatrixXd block(Index row, Index column) const;
 
+  /// Rotation of a node, with which its compliance has turned.
+  [[nodiscard]] virtual const Mat3& rotation(Index node) const noexcept;
   /// Terms in double beside the stored entries; null: none.
   [[nodiscard]] virtual const ExactTerms* exact_terms() const noexcept { return nullptr; }
   /// False where packed storage is used as it is, which is much slower, and for compressed ones.

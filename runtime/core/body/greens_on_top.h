@@ -11,6 +11,7 @@ namespace palpate {
 /// Green's functions of the same nodes and storage as others, from which they differ by arithmetic.
 class GreensOnTop : public Greens {
  public:
+  [[nodiscard]] const Mat3& rotation(Index node) const noexcept override { return below().rotation(node); }
   [[nodiscard]] const ExactTerms* exact_terms() const noexcept override { return below().exact_terms(); }
   [[nodiscard]] bool unfolded() const noexcept override { return below().unfolded(); }
   [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept override {

@@ -324,10 +324,12 @@ void LocalCompliance::follow(const ElasticBody& body, std::span<const Index> mes
   fade_at_planes(body, free);
   for (std::size_t node = 0; node < points_.size(); ++node) {
     const SurfaceParts of_node = body.surface_parts(static_cast<Index>(node));
-    double reach = 0.0, weight = 0.0, faded = 0.0;
+    double reach = 0.0, weight = 0.0, faded = 0.0, largest = 0.0;
     for (std::size_t k = 0; k < of_node.stored.size(); ++k) {
       points_[node].share += of_node.weights[k] * free[at(of_node.stored[k])];
       const double part = std::abs(of_node.weights[k]);
+      if (part > largest) points_[node].follows = of_node.stored[k];
+      largest = std::max(largest, part);
       reach += part * points_[at(body.surface_node_of_stored(of_node.stored[k]))].reach;
       faded += part * points_[at(body.surface_node_of_stored(of_node.stored[k]))].part;
       weight += part;

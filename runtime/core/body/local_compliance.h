@@ -41,6 +41,7 @@ class LocalCompliance {
     double reach = 0.0;         ///< [m] four edges
     double part = 1.0;    ///< of B and D that count: less near nodes that are held along some axes, 0 there
     double disc = 0.0;    ///< radius of the disc as large as its part of the surface [m]
+    Index follows = 0;    ///< stored node with the largest share of its displacement
     double crease = 0.0;  ///< [rad] largest angle between the normal and those of the faces around
   };
   [[nodiscard]] const Point& point(Index node) const noexcept {

@@ -46,6 +46,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
   const auto blocks = [d = dimension_](Index nodes) { return at(d * d * nodes); };
   work_.blocks.resize(blocks(capacity));
   work_.by_followed.resize(blocks(followed_.room()));
+  if (body.local() != nullptr) work_.local.resize(blocks(capacity));
   work_.gathered.resize(blocks(std::max(followed_.room(), patch_nodes)));
   work_.fine_row.resize(patch_nodes > 0 ? at(dimension_ * Patch::most_nodes) : 0);
 }

@@ -63,6 +63,10 @@ class NearField {
   /// tick (with other members), or with a patch.
   bool want_group(const ElasticBody& body, Index group, std::span<const double> weights,
                   std::span<const Eigen::Matrix3d> maps) noexcept;
+  /// Stored nodes that the nodes beside the patch follow, in no order.
+  [[nodiscard]] std::span<const Index> followed() const noexcept { return followed_.nodes(); }
+  /// Largest number of these.
+  [[nodiscard]] Index followed_room() const noexcept { return followed_.room(); }
   /// True if a place is that of a group.
   [[nodiscard]] bool is_group(Index place) const noexcept { return node(place) >= surface_nodes_; }
   /// Calls visit(surface node, weight, map) for the members of the group at a place.
@@ -175,6 +179,7 @@ class NearField {
     std::vector<double> by_followed;  // [d x d followed] its displacement by forces on stored nodes
     std::vector<double> gathered;     // [d x d max(followed, patch room)]
     std::vector<double> fine_row;     // [d most_nodes]
+    std::vector<double> local;        // [3 x 3 capacity] its local compliance before it turned
   };
 
   int dimension_;

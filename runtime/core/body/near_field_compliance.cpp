@@ -184,16 +184,28 @@ void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexc
   if (load_.local_now() != nullptr) add_local(*load_.local_now(), place);
 }
 
-/// Adds the local compliance between a node and those before it.
+/// Adds the local compliance between a node and those before it, turned with them.
 void NearField::add_local(const LocalCompliance& local, Index place) noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{3} * (place + 1);
-  local.add_row(local.point(node(place)), local_points_, place + 1, work_.blocks.data());
-  for (Index other = 0; other < place; ++other) {
-    if (!is_group(other)) continue;
+  const LocalCompliance::Point& point = local.point(node(place));
+  const bool turns = load_.compliance != nullptr;
+  if (turns) std::fill_n(work_.local.begin(), 3 * width, 0.0);
+  local.add_row(point, local_points_, place + 1, turns ? work_.local.data() : work_.blocks.data());
+  const Mat3 R = load_.rotation(point);
+  for (Index other = 0; other <= place; ++other) {
     Mat3 B = Mat3::Zero();
-    for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
-      B += local.between(local.point(node(place)), local.point(member)) * map;
-    });
+    if (is_group(other) && other < place) {
+      for_each_member(other, [&](Index member, double, const Eigen::Matrix3d& map) {
+        const LocalCompliance::Point& loaded = local.point(member);
+        B += R * local.between(point, loaded) * load_.rotation(loaded).transpose() * map;
+      });
+    } else if (turns) {
+      using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+      const Eigen::Map<const Rows> row(work_.local.data(), 3, width);
+      B = R * row.middleCols<3>(3 * other) * load_.rotation(local.point(node(other))).transpose();
+    } else {
+      continue;
+    }
     for (std::ptrdiff_t i = 0; i < 3; ++i) {
       for (std::ptrdiff_t j = 0; j < 3; ++j)
         work_.blocks[at(static_cast<Index>(i * width + std::ptrdiff_t{3} * other + j))] += B(i, j);

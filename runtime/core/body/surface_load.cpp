@@ -32,8 +32,8 @@ SurfaceLoad::SurfaceLoad(const ElasticBody& body, Index near_nodes, Index stored
       beside(dofs(dimension, patch_nodes)) {}
 
 const Greens& SurfaceLoad::greens(const ElasticBody& body) const noexcept {
-  if (local_now() != nullptr) return local->smooth();
-  return compliance != nullptr ? *compliance : body.greens();
+  if (compliance != nullptr) return *compliance;
+  return local_now() != nullptr ? local->smooth() : body.greens();
 }
 
 void SurfaceLoad::clear() noexcept {
@@ -80,11 +80,18 @@ void SurfaceLoad::lump_points() noexcept {
   }
 }
 
+Vec3 SurfaceLoad::by_force(const LocalCompliance::Point& at, const LocalCompliance::Point& loaded,
+                           const Vec3& f) const noexcept {
+  const Mat3 B = local->between(at, loaded);
+  if (compliance == nullptr) return B * f;
+  return rotation(at) * (B * (rotation(loaded).transpose() * f));
+}
+
 Vec3 SurfaceLoad::local_displacement(Index surface_node) const noexcept {
   Vec3 sum = Vec3::Zero();
   if (!is_in_local_reach(*this, surface_node)) return sum;
   for (std::size_t k = 0; k < static_cast<std::size_t>(point_count); ++k)
-    sum += local->between(local->point(surface_node), local->point(point[k])) * point_force[k];
+    sum += by_force(local->point(surface_node), local->point(point[k]), point_force[k]);
   return sum;
 }
 
@@ -92,8 +99,7 @@ Vec3 SurfaceLoad::far_local_displacement(Index surface_node) const noexcept {
   Vec3 sum = Vec3::Zero();
   if (!is_in_local_reach(*this, surface_node)) return sum;
   for (std::size_t k = 0; k < lump.size(); ++k) {
-    if (!lump_force[k].isZero(0.0))
-      sum += local->between(local->point(surface_node), lump[k]) * lump_force[k];
+    if (!lump_force[k].isZero(0.0)) sum += by_force(local->point(surface_node), lump[k], lump_force[k]);
   }
   return sum;
 }

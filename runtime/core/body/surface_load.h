@@ -32,10 +32,17 @@ struct SurfaceLoad {
   [[nodiscard]] Vec3 local_displacement(Index node) const noexcept;
   /// Displacement [m] by the local compliance of a node that is not close to the forces: in less time.
   [[nodiscard]] Vec3 far_local_displacement(Index node) const noexcept;
-  /// The body's local compliance where it holds: not with a patch, nor for a body that has changed.
+  /// The body's local compliance where it holds: not with a patch.
   [[nodiscard]] const LocalCompliance* local_now() const noexcept {
-    return patch == nullptr && compliance == nullptr ? local.get() : nullptr;
+    return patch == nullptr ? local.get() : nullptr;
   }
+  /// Rotation with which the local compliance of a point has turned.
+  [[nodiscard]] Mat3 rotation(const LocalCompliance::Point& at) const noexcept {
+    return compliance != nullptr ? compliance->rotation(at.follows) : Mat3(Mat3::Identity());
+  }
+  /// Displacement [m] of a point by a force [N] on another, by the local compliance.
+  [[nodiscard]] Vec3 by_force(const LocalCompliance::Point& at, const LocalCompliance::Point& loaded,
+                              const Vec3& f) const noexcept;
   /// True if forces on the surface nodes of a patch fit.
   [[nodiscard]] bool fits(const Patch& other) const noexcept {
     return !other.is_sampled() || other.fine_dofs() <= dimension * Patch::most_nodes;
@@ -50,8 +57,8 @@ struct SurfaceLoad {
     return {force.data(), static_cast<std::size_t>(dimension * count)};
   }
 
-  /// Compliance for the forces: `compliance`, or the body's Green's functions, with a local compliance those
-  /// of its smooth part.
+  /// Compliance for the forces: `compliance`, or the body's Green's functions, with a local compliance that
+  /// of the smooth part.
   [[nodiscard]] const Greens& greens(const ElasticBody& body) const noexcept;
 
   int dimension;  ///< d

@@ -16,6 +16,10 @@ class TurnedGreens final : public GreensOnTop {
                const Eigen::MatrixXd& right)
       : GreensOnTop(std::move(greens)), rotations_(std::move(rotations)), left_(left), right_(right) {}
 
+  [[nodiscard]] const Mat3& rotation(Index node) const noexcept override {
+    return rotations_[static_cast<std::size_t>(node)];
+  }
+
   void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
     below().gather(row, columns, blocks);
     const auto d = static_cast<Eigen::Index>(dimension());

@@ -88,6 +88,7 @@ Index near_room(const ElasticBody& body, const StateOptions& options) {
 
 SurfaceState make_surface(const ElasticBody& body, const StateOptions& options) {
   NearField near(body, near_room(body, options), options.patch_nodes);
+  const ComplianceChange change(body, near.followed_room());
   FreeMotion motion(body, options.tick, static_cast<Index>(near.load().node.size()));
   return {.tree = SurfaceTree(body.simplices(), body.dimension(), body.surface_rest_positions(),
                               tuning.far.tree_margin * body.mean_surface_edge()),
@@ -95,6 +96,7 @@ SurfaceState make_surface(const ElasticBody& body, const StateOptions& options) 
           .motion = std::move(motion),
           .stored_displacement = std::vector<double>(static_cast<std::size_t>(body.greens().order())),
           .sweep = FarSweep(body.runs().count()),
+          .change = change,
           .patch = nullptr,
           .rigid_compliance = tuning.assembly.coincident_share * mean_compliance(body),
           .least_compliance = tuning.assembly.wall_share * least_compliance_of_a_node(body)};

@@ -70,6 +70,19 @@ struct FarSweep {
   std::vector<RunPlace> runs;    ///< [ElasticBody::runs] when near_runs was filled
 };
 
+/// Workspace of a change of the compliance.
+struct ComplianceChange {
+  ComplianceChange(const ElasticBody& body, Index nodes)
+      : range(static_cast<std::size_t>(nodes)),
+        before(static_cast<std::size_t>(body.dimension()) * range.size()),
+        after(before.size()),
+        of_all(static_cast<std::size_t>(body.greens().order())) {}
+
+  std::vector<NodeRange> range;       ///< nodes that near nodes follow, one each
+  std::vector<double> before, after;  ///< their displacement by the forces, d each [m]
+  std::vector<double> of_all;         ///< [n] what the change takes from the displacement by forces [m]
+};
+
 /// Deformed surface, kept from tick to tick. Each member: shape, stages that change it.
 struct SurfaceState {
   SurfaceTree tree;                         ///< [S] all stages that move the surface
@@ -77,6 +90,7 @@ struct SurfaceState {
   FreeMotion motion;                        ///< [n] follow_free_motion and release
   std::vector<double> stored_displacement;  ///< [n] by contact forces, as of their last update [m]
   FarSweep sweep;                           ///< renew_far_surface and renew_patch_surface
+  ComplianceChange change;                  ///< change_compliance
   std::shared_ptr<const Patch> patch;       ///< requested overlay, null for none; used from the next tick on
   bool patch_is_older = false;  ///< set by the patch source: older patch in use (StepStatus::older_patch)
   double rigid_compliance;      ///< constant: added to every contact, so that coincident points divide the

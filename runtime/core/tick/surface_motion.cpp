@@ -33,6 +33,18 @@ Vec3 stored_displacement(const ElasticBody& body, const SurfaceState& surface, I
   return sum + surface.near.load().far_local_displacement(node);
 }
 
+/// Moves a surface node that is not near a tool with the body. Where it has a local compliance only by the
+/// motion's change: its displacement by forces is as of its last update, and takes long.
+void follow_motion(const ElasticBody& body, SurfaceState& surface, Index node) noexcept {
+  if (surface.near.load().local_now() == nullptr) {
+    move_far(body, surface, node, stored_displacement(body, surface, node));
+  } else if (surface.near.place_of(node) < 0) {
+    static_cast<void>(surface.motion.at(body, node));
+    const Vec3 position = surface.tree.position(node) + surface.motion.change(node);
+    if (position.allFinite()) surface.tree.move(node, position);
+  }
+}
+
 /// Computes the displacement of ranges of stored nodes by the near field's load.
 void displace_ranges(const ElasticBody& body, const SurfaceState& surface, std::span<double> room,
                      std::span<const NodeRange> ranges) noexcept {
@@ -133,15 +145,39 @@ void renew_all_in_turn(const ElasticBody& body, SurfaceState& surface, std::span
 }  // namespace
 
 void change_compliance(const ElasticBody& body, SurfaceState& surface,
-                       const std::shared_ptr<const Greens>& compliance) noexcept {
+                       const std::shared_ptr<const Greens>& compliance,
+                       std::span<const double> shift) noexcept {
   const SurfaceLoad& load = surface.near.load();
   if (load.compliance == compliance) return;
   std::vector<double>& u = surface.stored_displacement;
-  load.greens(body).displacement(load.nodes(), load.forces(), u);
-  surface.motion.take_over(body, u, 1.0);
+  if (shift.empty()) {
+    load.greens(body).displacement(load.nodes(), load.forces(), u);
+    surface.motion.take_over(body, u, 1.0);
+    surface.near.change_compliance(body, compliance);
+    load.greens(body).displacement(load.nodes(), load.forces(), u);
+    surface.motion.take_over(body, u, -1.0);
+    return;
+  }
+  // Near nodes by the forces now, others as the job's forces moved them.
+  const auto d = static_cast<std::size_t>(body.dimension());
+  ComplianceChange& change = surface.change;
+  const std::size_t count = surface.near.followed().size();
+  for (std::size_t k = 0; k < count; ++k)
+    change.range[k] = {surface.near.followed()[k], surface.near.followed()[k] + 1};
+  const auto look = [&](std::vector<double>& at) {
+    load.greens(body).displacement(load.nodes(), load.forces(), std::span(change.range).first(count),
+                                   std::span(at).first(d * count));
+  };
+  look(change.before);
   surface.near.change_compliance(body, compliance);
-  load.greens(body).displacement(load.nodes(), load.forces(), u);
-  surface.motion.take_over(body, u, -1.0);
+  look(change.after);
+  std::copy(shift.begin(), shift.end(), change.of_all.begin());
+  for (std::size_t k = 0; k < d * count; ++k) {
+    const std::size_t dof = d * static_cast<std::size_t>(change.range[k / d].first) + k % d;
+    change.of_all[dof] = change.before[k] - change.after[k];
+  }
+  surface.motion.take_over(body, change.of_all, 1.0);
+  for (std::size_t dof = 0; dof < u.size(); ++dof) u[dof] -= change.of_all[dof];
 }
 
 void move_near_surface(const ElasticBody& body, SurfaceState& surface) noexcept {
@@ -171,7 +207,7 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
         std::min(near_core(surface.tree, core, reach, detection.found), detection.pairs.size());
     for (std::size_t k = 0; k < found; ++k) {
       for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(detection.found[k]), d)) {
-        if (body.surface_moves(node)) move_far(body, surface, node, stored_displacement(body, surface, node));
+        if (body.surface_moves(node)) follow_motion(body, surface, node);
       }
     }
     surface.tree.refit();

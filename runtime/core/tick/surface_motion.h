@@ -15,7 +15,8 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
 /// Switches the compliance for contact forces, null for the body's Green's functions, without moving the
 /// surface. Call after FreeMotion::receive, between ticks.
 void change_compliance(const ElasticBody& body, SurfaceState& surface,
-                       const std::shared_ptr<const Greens>& compliance) noexcept;
+                       const std::shared_ptr<const Greens>& compliance,
+                       std::span<const double> shift = {}) noexcept;
 
 /// Moves the near surface nodes by free motion and contact forces.
 void move_near_surface(const ElasticBody& body, SurfaceState& surface) noexcept;

@@ -105,10 +105,12 @@ bool rolls(const LastContacts& remembered, const Tool& tool, const ContactPoint&
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
-/// Cosine of the angle by which a contact's normal is off the surface's at rest; on a crease, off that of the
-/// nearest of the faces around.
-double inclination(const LocalCompliance::Point& point, const Vec3& normal) noexcept {
-  const double angle = std::acos(std::clamp(point.normal.dot(normal), -1.0, 1.0));
+/// Cosine of the angle by which a contact's normal is off the surface's, which has turned from where it was
+/// at rest; on a crease, off that of the nearest of the faces around.
+double inclination(const SurfaceLoad& load, Index node, const Vec3& normal) noexcept {
+  const LocalCompliance::Point& point = load.local->point(node);
+  const Vec3 turned = load.rotation(point) * point.normal;
+  const double angle = std::acos(std::clamp(turned.dot(normal), -1.0, 1.0));
   return std::cos(std::max(0.0, angle - point.crease));
 }
 
@@ -133,7 +135,7 @@ void add_candidate(const ElasticBody& body, State& state, Scratch& scratch, Inde
   const Index vertex = vertex_of(nodes, pair.nearest.weights);
   if (is_duplicate(body, scratch.detection, begin, pair.nearest.on_simplex, normal, vertex)) return;
   const bool is_fine = vertex >= 0 && body.local() != nullptr;
-  const double inclined = is_fine ? inclination(body.local()->point(vertex), normal) : 1.0;
+  const double inclined = is_fine ? inclination(state.surface.near.load(), vertex, normal) : 1.0;
   if (inclined < tuning.detection.holds) return;
   if (vertex >= 0) {
     scratch.detection.candidate_at_node[vertex] = scratch.detection.candidate_count;

@@ -32,7 +32,7 @@ export class LiveControls {
 
   show({ settings }: State): void {
     part('live-settings').hidden = settings.solver === undefined;
-    part('overlay-line').hidden = part('warp-line').hidden = settings.solver !== undefined; // they are of Green's functions
+    part('overlay-line').hidden = part('depth-line').hidden = settings.solver !== undefined; // they are of Green's functions
     if (settings.solver === undefined) return;
     part('overlay-note').hidden = true;
     select('contact').disabled = true;

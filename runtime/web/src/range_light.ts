@@ -32,12 +32,12 @@ export function turned_beside(rest_normal: ArrayLike<number>, { position, normal
 }
 
 /** What it means, with the numbers, and what to do. */
-export function light_title(light: Light, change: NonNullable<State['change']>, studied: number, is_warped: boolean): string {
+export function light_title(light: Light, change: NonNullable<State['change']>, studied: number, is_deep: boolean): string {
   const strain = (100 * change.strain).toFixed(0);
   const range = `Largest rotation of the surface beside the dent; its largest strain is ${strain} %. Forces were found right within 5 % up to a rotation of ${(degrees * studied).toFixed(0)}°`;
   if (light === 'good') return `${range}.`;
   if (light === 'near') return `${range}, of which this is more than half.`;
-  return `${range}: for this one ${is_warped ? '' : 'turn on Warp, or '}play with --solver corotational.`;
+  return `${range}: for this one ${is_deep ? '' : 'turn on Depth, or '}play with --solver corotational.`;
 }
 
 /** The light beside the contacts, and what it means where it is not green; `beside` is what turned_beside has. */
@@ -51,7 +51,7 @@ export function show_light({ change: all, model, settings }: State, beside: numb
   if (light === null || !change || !model.studied_rotation) return;
   shown.dataset.light = light;
   write(shown, `● turned ${(degrees * change.rotation).toFixed(0)}°`);
-  write(part('range-note'), light_title(light, change, model.studied_rotation, settings.warp === 'yes'));
-  shown.title = light_title(light, change, model.studied_rotation, settings.warp === 'yes');
+  write(part('range-note'), light_title(light, change, model.studied_rotation, settings.depth === 'yes'));
+  shown.title = light_title(light, change, model.studied_rotation, settings.depth === 'yes');
   shown.ariaLabel = `${light === 'good' ? 'within' : light === 'near' ? 'near the end of' : 'beyond'} what was studied: ${shown.title}`;
 }

@@ -49,7 +49,7 @@ export class RunControls {
     this.on_number('stiffness-scale', 'stiffness-scale', 1e-9);
     select('contact').addEventListener('change', () => this.change('contact', select('contact').value));
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).addEventListener('change', () => this.change_overlay(id));
-    input('warp').addEventListener('change', () => this.change('warp', input('warp').checked ? 'yes' : null));
+    input('two-levels').addEventListener('change', () => this.change('depth', input('two-levels').checked ? 'yes' : null));
   }
 
   toggle_pause(): void {
@@ -144,7 +144,7 @@ export class RunControls {
     const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
     if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);
     if (overlay?.[2]) show_value(input('overlay-rings'), overlay[2]);
-    this.show_warp(state);
+    this.show_depth(state);
     this.live_.show(state);
     show_value(input('stiffness-scale'), settings['stiffness-scale'] ?? '1');
     show_value(input('load-scale'), settings['load-scale'] ?? '1');
@@ -152,19 +152,19 @@ export class RunControls {
     input('load-scale').title = model.loads ? 'Gravity and other loads of the model, times this' : 'This model has no loads';
   }
 
-  /** A warped body has no inertia and no overlays. */
-  private show_warp({ settings }: State): void {
-    const is_warped = settings.warp === 'yes';
+  /** A body on two levels has no inertia and no patches. */
+  private show_depth({ settings }: State): void {
+    const is_deep = settings.depth === 'yes';
     const in_the_way = settings.overlay !== undefined ? 'overlay' : settings.contact === 'dynamic' ? 'dynamic contact' : '';
-    const warp = input('warp');
-    warp.checked = is_warped;
-    warp.disabled = !is_warped && in_the_way !== '';
-    warp.title = warp.disabled ? `Not with ${in_the_way}: turn that off first` : 'Parts that turn take their stiffness with them, without a solver';
-    input('overlay').title = is_warped ? 'A warped body has no overlays' : 'A finer mesh under the tool';
-    if (!is_warped) return;
+    const depth = input('two-levels');
+    depth.checked = is_deep;
+    depth.disabled = !is_deep && in_the_way !== '';
+    depth.title = depth.disabled ? `Not with ${in_the_way}: turn that off first` : 'The body turns and bends far, by a coarse body of large strain';
+    input('overlay').title = is_deep ? 'Not with depth' : 'A finer mesh under the tool';
+    if (!is_deep) return;
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = true;
     part('overlay-note').hidden = true;
-    select('contact').title = 'A warped body has no inertia';
+    select('contact').title = 'With depth the body has no inertia';
   }
 
   /** No more is offered than the file has layers for. */

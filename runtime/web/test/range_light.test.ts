@@ -23,8 +23,8 @@ test('there is none where nothing was studied, or nothing is shown', () => {
 test('it says the numbers and what to do', () => {
   assert.match(light_title('good', turned(3), studied, false), /strain is 3 %.*within 5 % up to a rotation of 18°\.$/);
   assert.match(light_title('near', turned(12), studied, false), /more than half/);
-  assert.match(light_title('over', turned(30), studied, false), /turn on Warp/);
-  assert.doesNotMatch(light_title('over', turned(95), studied, true), /--warp/);
+  assert.match(light_title('over', turned(30), studied, false), /turn on Depth/);
+  assert.doesNotMatch(light_title('over', turned(95), studied, true), /turn on Depth/);
   assert.match(light_title('over', turned(95), studied, true), /--solver corotational/);
 });
 

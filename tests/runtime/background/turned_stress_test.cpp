@@ -10,7 +10,8 @@
 
 #include "runtime/background/element_stress.h"
 #include "runtime/background/surface_stress.h"
-#include "tests/support/bodies/warp_cases.h"
+#include "runtime/depth/deep_model.h"
+#include "tests/support/bodies/bent_bodies.h"
 
 namespace palpate::turned_stress_test {
 namespace {
@@ -29,7 +30,7 @@ class TurnedStress : public testing::TestWithParam<ElementType> {
   TurnedStress()
       : model(test::bent_model(GetParam())),
         still(model),
-        turning(warped_model(model), {}, 1, ContactModel::warped),
+        turning(deep_model(model), {}, 1, ContactModel::two_level),
         at(still.surface_in_mesh()),
         turn(Eigen::AngleAxisd(100.0 * degree,
                                model.dimension() == 2 ? Vec3(0, 0, 1) : Vec3(Vec3(1, 2, -2) / 3.0))) {}
@@ -89,13 +90,13 @@ TEST_P(TurnedStress, TurnsWithTheBody) {
 TEST(BentStress, IsThatOfTheEdgesStretchAndOfTheCorotationalBody) {
   Model model = test::bent_model(ElementType::quad4);
   ASSERT_EQ(model.analysis, Analysis::plane_stress);
-  const Body body(warped_model(model), {}, 1, ContactModel::warped);
+  const Body body(deep_model(model), {}, 1, ContactModel::two_level);
   const std::vector<Vec3> at = body.surface_in_mesh(), none(at.size(), Vec3::Zero());
-  const test::BendingLaw truth = test::corotational(model), warped = test::warped(body);
+  const test::BendingLaw truth = test::corotational(model), deep = test::on_two_levels(body);
   const test::EndFace face(model.mesh);
   // Both under the force that bends the truth by 60 degrees, in its direction.
   const double soft =
-      test::bend(model.mesh, warped, test::BendingLoad::follows, 1e-6, 1.0, 1).back().angle / 1e-6;
+      test::bend(model.mesh, deep, test::BendingLoad::follows, 1e-6, 1.0, 1).back().angle / 1e-6;
   const test::Bent end =
       test::bend(model.mesh, truth, test::BendingLoad::follows, 3.0 * degree / soft, 60.0 * degree).back();
   const Vec3 force = end.force * Vec3(-std::sin(end.angle), std::cos(end.angle), 0.0);
@@ -112,9 +113,9 @@ TEST(BentStress, IsThatOfTheEdgesStretchAndOfTheCorotationalBody) {
     for (const Stress& stress : stress_of(body, u, none)) values.push_back(von_mises(stress));
     return values;
   };
-  const std::vector<Vec3> by_truth = bent(truth), by_warp = bent(warped);
+  const std::vector<Vec3> by_truth = bent(truth), by_levels = bent(deep);
   ASSERT_GT(face.angle(by_truth), 60.0 * degree);
-  const std::vector<double> live = von_mises_of(by_truth), now = von_mises_of(by_warp);
+  const std::vector<double> live = von_mises_of(by_truth), now = von_mises_of(by_levels);
   const double largest = *std::max_element(live.begin(), live.end());
   int edges = 0;
   for (std::size_t k = 0; k < at.size(); ++k) {

@@ -26,7 +26,7 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"overlay", "r=16,rings=16"},
                              {"overlay-law", "neo-hookean"},
                              {"overlay-memory", "64"},
-                             {"warp", "yes"},
+                             {"depth", "yes"},
                              {"rate", "5000"},
                              {"motion-scale", "0.5"},
                              {"force-scale", "4"},
@@ -51,10 +51,10 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"wall-friction", "0.25"}};
 
 TEST(SettingsTable, HasEachMember) {
-  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, law, memory, warp, live, rate,
+  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, law, memory, depth, live, rate,
                motion, force, origin, axes, safety] = Settings{};
   const Settings all = read_settings(others);
-  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, law2, memory2, warp2, live2,
+  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, law2, memory2, depth2, live2,
                rate2, motion2, force2, origin2, axes2, safety2] = all;
   EXPECT_NE(reach, reach2);
   EXPECT_NE(contacts, contacts2);
@@ -64,7 +64,7 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(overlay.kind, overlay2.kind);
   EXPECT_NE(law, law2);
   EXPECT_NE(memory, memory2);
-  EXPECT_NE(warp, warp2);
+  EXPECT_NE(depth, depth2);
   const auto& [solver, poisson, step, integrator, step_solver, gravity, by_mass, by_stiffness, yield, creep,
                most_plastic, free, floor, room, obstacle, wall_friction] = live;
   const auto& [solver2, poisson2, step2, integrator2, step_solver2, gravity2, by_mass2, by_stiffness2, yield2,

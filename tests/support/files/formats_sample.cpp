@@ -73,14 +73,6 @@ CondensedPatch sample_patch(int dimension, Index nodes, Index surface_nodes) {
   return patch;
 }
 
-bool same_warp(const WarpStudy& a, const WarpStudy& b) {
-  const auto equal = [](const WarpStudy::Errors& x, const WarpStudy::Errors& y) {
-    return x.force == y.force && x.displacement == y.displacement;
-  };
-  return a.nodes == b.nodes && a.direction == b.direction && a.force == b.force && a.rotation == b.rotation &&
-         equal(a.linear, b.linear) && equal(a.warped, b.warped);
-}
-
 bool same_dynamics(const StoredDynamics& a, const StoredDynamics& b) {
   return a.method == b.method && a.lumped == b.lumped && a.newmark.alpha == b.newmark.alpha &&
          a.newmark.delta == b.newmark.delta && a.newmark.time_step == b.newmark.time_step &&
@@ -138,12 +130,6 @@ Model sample_model(ElementType element, int cells) {
   for (std::size_t i = model.fixed.size(); i-- > 0;)
     if (model.fixed[i] == 0) model.stored_nodes.push_back(static_cast<Index>(i));
   model.overlay = {3, 2, sample_centres(model), {sample_patch(d, 2, 3), sample_patch(d, 3, 1)}};
-  model.warp = {.nodes = sample_centres(model),
-                .direction = {0.6, -0.8, 0.0},
-                .force = {0.5, 1.25, 2.5},
-                .rotation = {0.1, 0.3, 0.9},
-                .linear = {{0.01, -0.2, std::numeric_limits<double>::infinity()}, {0.02, 0.3, 4.0}},
-                .warped = {{0.0, -0.01, 0.02}, {1e-3, 2e-3, 3e-3}}};
   model.scope = Scope::full;
   model.layers = 0;
   model.quality.min_angle = 45.0;
@@ -377,7 +363,6 @@ std::string difference(const Model& a, const Model& b) {
     return "probes";
   if (!same_overlay(a.overlay, b.overlay)) return "overlay";
   if (!same_dynamics(a.dynamics, b.dynamics)) return "dynamics";
-  if (!same_warp(a.warp, b.warp)) return "warp";
   if (!same_greens(a.greens, b.greens)) return "greens";
   return {};
 }

@@ -12,8 +12,8 @@
 namespace palpate::test {
 
 /// Box, in the plane rectangle, of `cells` cells along each axis, its lowest nodes held along some axis, all
-/// other nodes stored (54 dofs for 2 cells of tet4), two materials, loads, two sources, two probes, a study
-/// of warping of three levels, two overlays of 2 and 3 nodes, 3 and 1 on the surface.
+/// other nodes stored (54 dofs for 2 cells of tet4), two materials, loads, two sources, two probes, two
+/// overlays of 2 and 3 nodes, 3 and 1 on the surface.
 Model sample_model(ElementType element = ElementType::tet4, int cells = 2);
 
 /// Entry (i, j) of its Green's functions: symmetric, positive on the diagonal, no two neighbours equal.

@@ -1,0 +1,178 @@
+#include "runtime/background/two_level_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <utility>
+
+#include "base/vectors.h"
+
+namespace palpate {
+namespace {
+
+constexpr double tolerance = 1e-5;    // change of q in Newton's last step, of q
+constexpr int most_steps = 12;        // Newton's in a job
+constexpr double most_behind = 0.03;  // [rad] by which W may lag
+constexpr double most_wrong = 0.1;    // error of W, as a fraction of a step's displacement of loaded nodes
+constexpr std::size_t nodes_beside = 60;  // that a tool comes to meet until the next job
+constexpr double least_wrong = 1e-6;      // fraction of their displacement below which it is negligible
+
+/// Sine of half the angle between rotations: |A - B| = 2 sqrt(2) sin(angle / 2).
+double half_sine(const Mat3& A, const Mat3& B) {
+  return (A - B).norm() / std::sqrt(8.0);
+}
+
+CoarseParts coarse_parts(const Body& body) {
+  const std::vector<Material>& materials = body.model().materials;
+  const bool is_strained = std::any_of(materials.begin(), materials.end(), [](const Material& material) {
+    const auto& strain = material.initial_strain;
+    return std::any_of(strain.begin(), strain.end(), [](double s) { return s != 0.0; });
+  });
+  const LiveOptions options{.law = is_strained ? LiveLaw::corotational : LiveLaw::neo_hookean};
+  return make_coarse_parts(std::make_shared<const LiveBody>(live_input(body.model()), options),
+                           body.model().stored_nodes, most_coarse_dofs);
+}
+
+}  // namespace
+
+TwoLevelMotion::TwoLevelMotion(const Body& body)
+    : body_(body),
+      parts_(coarse_parts(body)),
+      levels_(parts_, body.shared_greens()),
+      R_renewed_(static_cast<std::size_t>(body.greens().nodes()), Mat3::Identity()),
+      by_load_(static_cast<std::size_t>(body.greens().order())),
+      x_(by_load_.size()),
+      x_before_(by_load_.size()),
+      without_(by_load_.size()) {}
+
+void TwoLevelMotion::rest() noexcept {
+  levels_.rest();
+  std::fill(R_renewed_.begin(), R_renewed_.end(), Mat3::Identity());
+  renewed_ = mesh_ = nullptr;
+  for (std::vector<double>* all : {&x_, &x_before_, &without_}) std::fill(all->begin(), all->end(), 0.0);
+  const std::lock_guard lock(mutex_);
+  telling_ = {};
+}
+
+DepthTelling TwoLevelMotion::telling() const {
+  const std::lock_guard lock(mutex_);
+  return telling_;
+}
+
+void TwoLevelMotion::take_load(const NodalLoad& load) {
+  const int d = body_.dimension();
+  nodes_.assign(load.nodes().begin(), load.nodes().end());
+  std::sort(nodes_.begin(), nodes_.end());
+  nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+  f_.assign(static_cast<std::size_t>(d) * nodes_.size(), 0.0);
+  for (std::size_t k = 0; k < load.nodes().size(); ++k) {
+    const auto at =
+        static_cast<Index>(std::lower_bound(nodes_.begin(), nodes_.end(), load.nodes()[k]) - nodes_.begin());
+    set_vector(f_, d, at, vector_at(f_, d, at) + vector_at(load.forces(), d, static_cast<Index>(k)));
+  }
+  std::vector<NodeRange> ranges;
+  for (const Index node : nodes_) ranges.push_back({node, node + 1});
+  places_.assign(f_.size(), 0.0);
+  if (nodes_.empty()) return;
+  now().displacement(nodes_, f_, ranges, places_);
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const auto at = static_cast<Index>(k);
+    set_vector(places_, d, at, vector_at(places_, d, at) + vector_at(without_, d, nodes_[k]));
+  }
+}
+
+void TwoLevelMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
+  std::swap(x_, x_before_);
+  try {
+    take_load(job.load);
+    const TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
+    std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
+    shift_.clear();
+    if (must_renew()) renew();
+    tell(report);
+    std::fill(by_load_.begin(), by_load_.end(), 0.0);
+    if (!nodes_.empty()) now().displacement(levels_.loaded(), levels_.forces(), by_load_);
+  } catch (const std::exception&) {  // out of memory: the body stays as it was
+    std::copy(without_.begin(), without_.end(), u.begin());
+    return;
+  }
+  for (std::size_t k = 0; k < u.size(); ++k) without_[k] = x_[k] - by_load_[k];
+  std::copy(without_.begin(), without_.end(), u.begin());
+}
+
+bool TwoLevelMotion::must_renew() const {
+  double behind = 0.0;
+  for (std::size_t node = 0; node < R_renewed_.size(); ++node)
+    behind = std::max(behind, half_sine(levels_.turns()[node].R, R_renewed_[node]));
+  if (behind > 0.5 * most_behind) return true;
+  if (renewed_ == nullptr || nodes_.empty()) return false;
+  // Where the tick would have had the loaded nodes.
+  std::vector<NodeRange> ranges;
+  for (const Index node : nodes_) ranges.push_back({node, node + 1});
+  std::vector<double> by_load(f_.size());
+  now().displacement(levels_.loaded(), levels_.forces(), ranges, by_load);
+  const int d = body_.dimension();
+  double off = 0.0, moved = 0.0, size = 0.0;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Vec3 x = vector_at(x_, d, nodes_[k]);
+    off +=
+        (x - vector_at(without_, d, nodes_[k]) - vector_at(by_load, d, static_cast<Index>(k))).squaredNorm();
+    moved += (x - vector_at(x_before_, d, nodes_[k])).squaredNorm();
+    size += x.squaredNorm();
+  }
+  return off > most_wrong * most_wrong * moved && off > least_wrong * least_wrong * size;
+}
+
+/// Loaded nodes, and those closest to them.
+std::vector<Index> TwoLevelMotion::near_nodes() const {
+  std::vector<std::pair<double, Index>> by_distance;
+  for (Index node = 0; node < body_.greens().nodes() && !nodes_.empty(); ++node) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Index loaded : nodes_)
+      nearest = std::min(nearest, (body_.rest_position(node) - body_.rest_position(loaded)).squaredNorm());
+    by_distance.emplace_back(nearest, node);
+  }
+  const std::size_t count = std::min(by_distance.size(), 2 * nodes_.size() + nodes_beside);
+  std::nth_element(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(count),
+                   by_distance.end());
+  std::vector<Index> near;
+  for (std::size_t k = 0; k < count; ++k) near.push_back(by_distance[k].second);
+  return near;
+}
+
+void TwoLevelMotion::renew() {
+  const auto moved = [&](const Greens& tick) {
+    std::vector<double> u(by_load_.size(), 0.0);
+    if (!nodes_.empty()) tick.displacement(levels_.loaded(), levels_.forces(), u);
+    return u;
+  };
+  const Greens& at_rest = body_.local() != nullptr ? body_.local()->smooth() : body_.greens();
+  shift_ = moved(renewed_ != nullptr ? *renewed_ : at_rest);
+  TwoLevelState state = levels_.state(near_nodes());
+  if (const LocalCompliance* local = body_.local().get(); local != nullptr) {
+    mesh_ = two_levels(body_.shared_greens(), state);
+    renewed_ = two_levels({body_.local(), &local->smooth()}, std::move(state));
+  } else {
+    renewed_ = mesh_ = two_levels(body_.shared_greens(), std::move(state));
+  }
+  const std::vector<double> now = moved(*renewed_);
+  for (std::size_t dof = 0; dof < now.size(); ++dof) shift_[dof] -= now[dof];
+  std::erase_if(kept_, [](const auto& old) { return old.use_count() == 1; });
+  kept_.push_back(renewed_);
+  const std::lock_guard lock(mutex_);
+  ++telling_.turns;
+}
+
+void TwoLevelMotion::tell(const TwoLevelReport& report) {
+  double turn = 0.0;
+  for (const CoarseTurn& node : levels_.turns())
+    turn = std::max(turn, 2.0 * std::asin(std::min(1.0, half_sine(node.R, Mat3::Identity()))));
+  const std::lock_guard lock(mutex_);
+  telling_.last_rotation = turn;
+  telling_.largest_rotation = std::max(telling_.largest_rotation, turn);
+  telling_.last_residual = report.residual;
+  telling_.unbalanced += report.converged ? 0 : 1;
+}
+
+}  // namespace palpate

@@ -1,0 +1,135 @@
+#include "runtime/core/body/coarse_field.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+constexpr double least_share =
+    1e-8;  // of a node's values that others do not have; less is no field of its own
+
+/// Lattice nodes along an axis.
+Index along(int dimension, const std::array<Index, 3>& cells, int axis) {
+  return axis < dimension ? 2 * cells[static_cast<std::size_t>(axis)] + 1 : 1;
+}
+
+/// Renumbers the nodes whose values at some points are independent, given their Gram matrix; others become
+/// -1.
+Index drop_dependent(const Eigen::MatrixXd& gram, std::vector<Index>& number) {
+  const Eigen::LDLT<Eigen::MatrixXd> pivoted(gram);
+  Eigen::VectorXi order =
+      Eigen::VectorXi::LinSpaced(static_cast<int>(gram.rows()), 0, static_cast<int>(gram.rows()) - 1);
+  order = pivoted.transpositionsP() * order;
+  const double least = least_share * pivoted.vectorD().cwiseAbs().maxCoeff();
+  std::vector<Index> kept(number.size(), -1);
+  for (Eigen::Index k = 0; k < gram.rows(); ++k)
+    if (pivoted.vectorD()[k] > least) kept[static_cast<std::size_t>(order[k])] = 0;
+  Index count = 0;
+  for (Index& k : kept)
+    if (k == 0) k = count++;
+  number = std::move(kept);
+  return count;
+}
+
+}  // namespace
+
+CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const std::array<Index, 3>& cells,
+                         std::span<const Vec3> points)
+    : dimension_(dimension), low_(low), edge_(Vec3::Ones()), cells_(cells) {
+  for (int axis = 0; axis < dimension; ++axis)
+    edge_[axis] = (high - low)[axis] / static_cast<double>(cells[static_cast<std::size_t>(axis)]);
+  const Index nx = along(dimension, cells, 0), ny = along(dimension, cells, 1);
+  Index all = 0;
+  std::vector<Index> number(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) *
+                                static_cast<std::size_t>(along(dimension, cells, 2)),
+                            -1);
+  const auto set_cells = [&](const auto& number_of) {
+    node_.clear();
+    const Index layers = dimension == 3 ? cells[2] : 1;
+    for (Index k = 0; k < layers; ++k) {
+      for (Index j = 0; j < cells[1]; ++j) {
+        for (Index i = 0; i < cells[0]; ++i) {
+          for (Index n = 0; n < 27; ++n) {
+            const bool is_there = dimension == 3 || n < 9;
+            const Index x = 2 * i + n % 3, y = 2 * j + n / 3 % 3, z = 2 * k + n / 9;
+            node_.push_back(is_there ? number_of(static_cast<std::size_t>((z * ny + y) * nx + x)) : -1);
+          }
+        }
+      }
+    }
+  };
+  set_cells([](std::size_t lattice) { return static_cast<Index>(lattice); });
+  for (const Vec3& x : points)  // the nodes of cells that hold some
+    for_each_node(place(x), [&](Index node, double, const Vec3&) {
+      if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = all++;
+    });
+  set_cells([&](std::size_t lattice) { return number[lattice]; });
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(all, all);
+  std::array<std::pair<Index, double>, 27> weights;
+  for (const Vec3& x : points) {
+    std::size_t count = 0;
+    for_each_node(place(x), [&](Index node, double weight, const Vec3&) {
+      weights[count++] = {node, weight};
+    });
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = 0; b < count; ++b)
+        gram(weights[a].first, weights[b].first) += weights[a].second * weights[b].second;
+    }
+  }
+  std::vector<Index> kept(static_cast<std::size_t>(all));
+  nodes_ = drop_dependent(gram, kept);
+  for (Index& node : node_)
+    if (node >= 0) node = kept[static_cast<std::size_t>(node)];
+}
+
+CoarsePlace CoarseField::place(const Vec3& x) const noexcept {
+  CoarsePlace at;
+  at.x = x;
+  Index cell = 0;
+  for (int axis = 2; axis >= 0; --axis) {
+    for (auto* all : {&at.value, &at.slope})
+      for (Vec3& of_node : *all) of_node[axis] = 0.0;
+    at.value[0][axis] = 1.0;  // of an axis that is not there
+    if (axis >= dimension_) continue;
+    const Index last = cells_[static_cast<std::size_t>(axis)] - 1;
+    const double in_cells = (x[axis] - low_[axis]) / edge_[axis];
+    const Index k = std::clamp(static_cast<Index>(std::floor(in_cells)), Index{0}, last);
+    const double s = in_cells - static_cast<double>(k), per = 1.0 / edge_[axis];
+    at.in_cell[axis] = 2.0 * s - 1.0;
+    at.value[0][axis] = (1.0 - s) * (1.0 - 2.0 * s);
+    at.value[1][axis] = 4.0 * s * (1.0 - s);
+    at.value[2][axis] = s * (2.0 * s - 1.0);
+    at.slope[0][axis] = (4.0 * s - 3.0) * per;
+    at.slope[1][axis] = (4.0 - 8.0 * s) * per;
+    at.slope[2][axis] = (4.0 * s - 1.0) * per;
+    cell = cell * (last + 1) + k;
+  }
+  at.cell = cell;
+  return at;
+}
+
+CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_dofs) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& x : nodes) box.extend(x);
+  const double longest = box.sizes().maxCoeff();
+  std::array<Index, 3> cells = {1, 1, 1};
+  CoarseField best(dimension, box.min(), box.max(), cells, nodes);
+  for (double edge = longest; edge > 0.02 * longest; edge *= 0.95) {
+    std::array<Index, 3> finer = {1, 1, 1};
+    for (int axis = 0; axis < dimension; ++axis)
+      finer[static_cast<std::size_t>(axis)] =
+          std::max(Index{1}, static_cast<Index>(std::lround(box.sizes()[axis] / edge)));
+    if (finer == cells) continue;
+    cells = finer;
+    CoarseField next(dimension, box.min(), box.max(), cells, nodes);
+    if (next.dofs() > most_dofs) break;
+    best = std::move(next);
+  }
+  return best;
+}
+
+}  // namespace palpate

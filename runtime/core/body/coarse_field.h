@@ -1,0 +1,68 @@
+// Coarse fields of displacement: quadratic polynomials on the cells of a grid.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vectors.h"
+
+namespace palpate {
+
+/// A point in a coarse grid: its cell, and the values and slopes [1/m] there of the three polynomials along
+/// each axis.
+struct CoarsePlace {
+  Index cell = 0;
+  Vec3 x = Vec3::Zero();        ///< [m]
+  Vec3 in_cell = Vec3::Zero();  ///< along each axis from -1 to 1 [-]
+  std::array<Vec3, 3> value, slope;
+};
+
+/// Displacement u = P q that is triquadratic in each cell of a grid (Lagrange's hexahedra of 27 nodes,
+/// quadrilaterals of 9 in the plane) and continuous. The grid need not fit a body: a body is embedded in it.
+/// Dof d k + axis of q belongs to coarse node k.
+class CoarseField {
+ public:
+  /// Grid of `cells` along each axis over a box; in the plane one along z. Its nodes are those of cells that
+  /// hold some of `points`, without those whose values at these points others have too.
+  CoarseField(int dimension, const Vec3& low, const Vec3& high, const std::array<Index, 3>& cells,
+              std::span<const Vec3> points);
+
+  [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
+  [[nodiscard]] Index nodes() const noexcept { return nodes_; }
+  [[nodiscard]] Eigen::Index dofs() const noexcept { return Eigen::Index{dimension_} * nodes_; }
+
+  /// Place of a point in the box, or beside it, where the next cell's polynomials go on.
+  [[nodiscard]] CoarsePlace place(const Vec3& x) const noexcept;
+
+  /// Calls visit(node, weight, gradient) for each node of the place's cell: P and its gradient [1/m] there.
+  template <class Visit>
+  void for_each_node(const CoarsePlace& at, const Visit& visit) const noexcept {
+    const Index* node = node_.data() + std::ptrdiff_t{at.cell} * 27;
+    for (int c = 0; c < (dimension_ == 3 ? 3 : 1); ++c) {
+      for (int b = 0; b < 3; ++b) {
+        for (int a = 0; a < 3; ++a) {
+          const Index number = node[9 * c + 3 * b + a];
+          if (number < 0) continue;
+          const double x = at.value[a].x(), y = at.value[b].y(), z = at.value[c].z();
+          visit(number, x * y * z,
+                Vec3(at.slope[a].x() * y * z, x * at.slope[b].y() * z, x * y * at.slope[c].z()));
+        }
+      }
+    }
+  }
+
+ private:
+  int dimension_;
+  Vec3 low_, edge_;
+  std::array<Index, 3> cells_;
+  Index nodes_ = 0;
+  std::vector<Index> node_;  // [cells * 27] -1 where there is none
+};
+
+/// The finest grid for a body with these free nodes whose field has at most `most_dofs`.
+CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_dofs);
+
+}  // namespace palpate

@@ -1,0 +1,215 @@
+#include "runtime/core/body/two_level_greens.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "runtime/core/body/greens_on_top.h"
+
+namespace palpate {
+namespace {
+
+using Columns = std::array<double, 3 * most_coarse_dofs>;
+
+class TwoLevelGreens final : public GreensOnTop {
+ public:
+  TwoLevelGreens(std::shared_ptr<const Greens> turned, TwoLevelState state)
+      : GreensOnTop(std::move(turned)),
+        state_(std::move(state)),
+        column_of_(state_.turns.size(), -1),
+        near_of_(state_.turns.size(), -1) {
+    for (std::size_t k = 0; k < state_.columns.size(); ++k) {
+      column_of_[static_cast<std::size_t>(state_.columns[k].node)] = static_cast<Index>(k);
+      answers_.emplace_back(state_.H_inverse * state_.columns[k].J);
+    }
+    prepare_near();
+  }
+
+  void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept override {
+    below().gather(row, columns, blocks);
+    const Eigen::Index d = dimension(), width = d * std::ssize(columns);
+    const Index near_row = near_of_[static_cast<std::size_t>(row)];
+    Columns a, b;
+    std::optional<Answer> answer;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      double* out = blocks.data() + d * static_cast<Eigen::Index>(k);
+      const Index near_column = near_of_[static_cast<std::size_t>(columns[k])];
+      if (near_row >= 0 && near_column >= 0) {
+        for (Eigen::Index i = 0; i < d; ++i) {
+          for (Eigen::Index j = 0; j < d; ++j)
+            out[i * width + j] += near_(d * near_column + j, d * near_row + i);
+        }
+        continue;
+      }
+      if (!answer) answer.emplace(respond(row, a, b));
+      const Mat3 block = by_answer(columns[k], *answer);
+      for (Eigen::Index i = 0; i < d; ++i) {
+        for (Eigen::Index j = 0; j < d; ++j) out[i * width + j] += block(j, i);
+      }
+    }
+  }
+
+  void displacement(std::span<const Index> nodes, std::span<const double> f,
+                    std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
+    below().displacement(nodes, f, ranges, u);
+    Columns load_at_rest, load, a, b;
+    const Eigen::Index n = state_.H_inverse.rows();
+    Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n), q_rest(a.data(), n),
+        q(b.data(), n);
+    P_f.setZero();
+    J_f.setZero();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
+      for_each_block(nodes[k], [&](Index node, double weight, const Vec3& gradient) {
+        add_forces(nodes[k], node, weight, gradient, force, P_f, J_f);
+      });
+      if (const Index c = column_of_[static_cast<std::size_t>(nodes[k])]; c >= 0) {
+        for (Eigen::Index axis = 0; axis < dimension(); ++axis)
+          J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
+      }
+    }
+    q_rest.noalias() = state_.nodes->compliance * P_f;
+    q.noalias() = state_.H_inverse * J_f;
+    Index out = 0;
+    for (const NodeRange& range : ranges) {
+      for (Index node = range.first; node < range.end; ++node, ++out) {
+        const Vec3 moved_by = moved(node, q).col(0) - at_rest(node, q_rest).col(0);
+        set_vector(u, dimension(), out, vector_at(u, dimension(), out) + moved_by);
+      }
+    }
+  }
+
+ private:
+  /// K_c^-1 P^T R^T and H^-1 J^T of a node [n_q x d].
+  struct Answer {
+    Eigen::Map<Eigen::MatrixXd> by_rest, by_tangent;
+  };
+
+  void prepare_near() {
+    const Eigen::Index d = dimension();
+    const std::vector<Index>& near = state_.near;
+    for (std::size_t k = 0; k < near.size(); ++k)
+      near_of_[static_cast<std::size_t>(near[k])] = static_cast<Index>(k);
+    near_.resize(d * std::ssize(near), d * std::ssize(near));
+    Columns a, b;
+    for (Eigen::Index k = 0; k < std::ssize(near); ++k) {
+      const Answer answer = respond(near[static_cast<std::size_t>(k)], a, b);
+      for (Eigen::Index i = 0; i <= k; ++i) {
+        const Mat3 block = by_answer(near[static_cast<std::size_t>(i)], answer);
+        near_.block(d * i, d * k, d, d) = block.topLeftCorner(d, d);
+        near_.block(d * k, d * i, d, d) = block.topLeftCorner(d, d).transpose();
+      }
+    }
+  }
+
+  /// Displacement of a node by unit forces along each axis on the node of an answer.
+  [[nodiscard]] Mat3 by_answer(Index stored, const Answer& answer) const noexcept {
+    return moved(stored, answer.by_tangent) - at_rest(stored, answer.by_rest);
+  }
+  template <class Visit>
+  void for_each_block(Index stored, const Visit& visit) const noexcept {
+    state_.nodes->field.for_each_node(state_.nodes->place[static_cast<std::size_t>(stored)], visit);
+  }
+  /// A vector of a stored node along the axes along which it is free.
+  [[nodiscard]] Vec3 free_part(Index stored, const Vec3& v) const noexcept {
+    const unsigned axes = state_.nodes->axes[static_cast<std::size_t>(stored)];
+    return {(axes & 1U) != 0 ? v.x() : 0.0, (axes & 2U) != 0 ? v.y() : 0.0, (axes & 4U) != 0 ? v.z() : 0.0};
+  }
+
+  /// Adds P^T R^T f and, without the node's column, J^T f of a coarse node.
+  void add_forces(Index stored, Index node, double weight, const Vec3& gradient, const Vec3& force,
+                  Eigen::Ref<Eigen::VectorXd> P_f, Eigen::Ref<Eigen::VectorXd> J_f) const noexcept {
+    const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
+    const Eigen::Index d = dimension();
+    P_f.segment(d * node, d) += weight * free_part(stored, turn.R.transpose() * force).head(d);
+    if (column_of_[static_cast<std::size_t>(stored)] >= 0) return;
+    const Vec3 by_turn = turn.R * gradient.cross(turn.T.transpose() * force);
+    J_f.segment(d * node, d) += (weight * free_part(stored, force) + by_turn).head(d);
+  }
+
+  [[nodiscard]] Answer respond(Index row, Columns& by_rest, Columns& by_tangent) const noexcept {
+    const Eigen::Index d = dimension(), n = state_.H_inverse.rows();
+    Answer answer{{by_rest.data(), n, d}, {by_tangent.data(), n, d}};
+    answer.by_rest.setZero();
+    const Index column = column_of_[static_cast<std::size_t>(row)];
+    if (column >= 0)
+      answer.by_tangent = answers_[static_cast<std::size_t>(column)];
+    else
+      answer.by_tangent.setZero();
+    const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(row)];
+    for_each_block(row, [&](Index node, double weight, const Vec3& gradient) {
+      for (Eigen::Index axis = 0; axis < d; ++axis) {
+        const Vec3 unit = Vec3::Unit(axis);
+        const Vec3 p = weight * free_part(row, turn.R.transpose() * unit);
+        const Vec3 j = weight * free_part(row, unit) + turn.R * gradient.cross(turn.T.transpose() * unit);
+        for (Eigen::Index i = 0; i < d; ++i) {
+          answer.by_rest.col(axis) += p[i] * state_.nodes->compliance.col(d * node + i);
+          if (column < 0) answer.by_tangent.col(axis) += j[i] * state_.H_inverse.col(d * node + i);
+        }
+      }
+    });
+    return answer;
+  }
+
+  /// R P q of a node for each column of q.
+  template <class Q>
+  [[nodiscard]] Mat3 at_rest(Index stored, const Q& q) const noexcept {
+    Mat3 sum = Mat3::Zero();
+    const Eigen::Index d = dimension();
+    for_each_block(stored, [&](Index node, double weight, const Vec3&) {
+      for (Eigen::Index column = 0; column < q.cols(); ++column)
+        sum.col(column).head(d) += weight * q.col(column).segment(d * node, d);
+    });
+    for (Eigen::Index column = 0; column < q.cols(); ++column)
+      sum.col(column) = state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, sum.col(column));
+    return sum;
+  }
+
+  /// J q of a node for each column of q.
+  template <class Q>
+  [[nodiscard]] Mat3 moved(Index stored, const Q& q) const noexcept {
+    Mat3 sum = Mat3::Zero();
+    const Eigen::Index d = dimension();
+    if (const Index c = column_of_[static_cast<std::size_t>(stored)]; c >= 0) {
+      const Eigen::MatrixXd& J = state_.columns[static_cast<std::size_t>(c)].J;
+      for (Eigen::Index column = 0; column < q.cols(); ++column) {
+        for (Eigen::Index i = 0; i < d; ++i) sum(i, column) = J.col(i).dot(q.col(column));
+      }
+      return sum;
+    }
+    std::array<Mat3, 3> slope;  // gradient of the field, for each column
+    slope.fill(Mat3::Zero());
+    for_each_block(stored, [&](Index node, double weight, const Vec3& gradient) {
+      for (Eigen::Index column = 0; column < q.cols(); ++column) {
+        Vec3 part = Vec3::Zero();
+        part.head(d) = q.col(column).segment(d * node, d);
+        sum.col(column) += weight * part;
+        slope[static_cast<std::size_t>(column)] += part * gradient.transpose();
+      }
+    });
+    const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
+    for (Eigen::Index column = 0; column < q.cols(); ++column) {
+      const Mat3 A = turn.R.transpose() * slope[static_cast<std::size_t>(column)];
+      const Vec3 curl(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
+      sum.col(column) = free_part(stored, sum.col(column)) - turn.T * curl;
+    }
+    return sum;
+  }
+
+  TwoLevelState state_;
+  std::vector<Index> column_of_, near_of_;  // [nodes] in state_.columns and near; -1: none
+  std::vector<Eigen::MatrixXd> answers_;    // [columns] H^-1 J^T
+  Eigen::MatrixXd near_;                    // [d near, d near] the coarse field's part
+};
+
+}  // namespace
+
+std::shared_ptr<const Greens> two_levels(std::shared_ptr<const Greens> Xi, TwoLevelState state) {
+  std::vector<Mat3> R;
+  for (const CoarseTurn& turn : state.turns) R.push_back(turn.R);
+  return std::make_shared<const TwoLevelGreens>(turned(std::move(Xi), std::move(R)), std::move(state));
+}
+
+}  // namespace palpate

@@ -1,0 +1,213 @@
+#include "runtime/depth/coarse_body.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "base/vectors.h"
+#include "meshes/element.h"
+#include "statics/polar.h"
+
+namespace palpate {
+namespace {
+
+using Eigen::Map;
+using Eigen::Matrix3Xd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double parts_of_cell = 3.0;  // along each axis
+
+using Term = std::array<Index, 3>;  // its dofs
+
+/// Gradients of the terms of a quadrature point [1/m].
+std::map<Term, Vec3> terms_of(const LiveBody& fine, const CoarseField& field, Index point) {
+  const Mesh& mesh = fine.mesh();
+  const Index d = fine.dimension();
+  std::map<Term, Vec3> terms;
+  Eigen::Index k = 0;
+  for (const Index node : mesh.element_nodes(point / fine.points())) {
+    const Vec3 N = fine.gradients(point).col(k++);
+    field.for_each_node(field.place(mesh.nodes[static_cast<std::size_t>(node)]),
+                        [&](Index coarse, double weight, const Vec3&) {
+                          Term dofs = {-1, -1, -1};
+                          for (Index axis = 0; axis < d; ++axis)
+                            if (fine.free_of_dof()[static_cast<std::size_t>(d * node + axis)] >= 0)
+                              dofs[static_cast<std::size_t>(axis)] = d * coarse + axis;
+                          terms.try_emplace(dofs, Vec3::Zero()).first->second += weight * N;
+                        });
+  }
+  terms.erase({-1, -1, -1});  // of held nodes
+  return terms;
+}
+
+}  // namespace
+
+/// A part at some q.
+struct CoarseBody::State {
+  Matrix3Xd u;     // of its terms
+  Mat3 F, R, G;    // mean deformation gradient, its rotation, (tr U I - U)^-1
+  Matrix3Xd q, y;  // displacement of its terms in the part's frame, and K times it
+};
+
+CoarseBody::CoarseBody(const LiveBody& fine, const CoarseField& field) : fine_(fine), dofs_(field.dofs()) {
+  const Mesh& mesh = fine.mesh();
+  const std::span<const QuadraturePoint> rule = quadrature(mesh.element);
+  std::map<std::array<Index, 5>, std::vector<Index>> points;  // by cell, place in the cell, and law
+  for (Index point = 0; point < fine.all_points(); ++point) {
+    const Index element = point / fine.points();
+    const ShapeValues values =
+        shape_functions(mesh.element, rule[static_cast<std::size_t>(point % fine.points())].xi);
+    Vec3 x = Vec3::Zero();
+    Eigen::Index k = 0;
+    for (const Index node : mesh.element_nodes(element))
+      x += values[k++] * mesh.nodes[static_cast<std::size_t>(node)];
+    const CoarsePlace at = field.place(x);
+    std::array<Index, 5> key = {at.cell, 0, 0, 0,
+                                static_cast<Index>(&fine.constants(element) - &fine.constants(0))};
+    for (int axis = 0; axis < fine.dimension(); ++axis)
+      key[static_cast<std::size_t>(1 + axis)] =
+          static_cast<Index>(std::clamp(0.5 * (at.in_cell[axis] + 1.0), 0.0, 0.999) * parts_of_cell);
+    points[key].push_back(point);
+  }
+  for (const auto& [key, of_part] : points) measure(field, of_part, parts_.emplace_back());
+}
+
+void CoarseBody::measure(const CoarseField& field, const std::vector<Index>& points, Part& part) const {
+  std::map<Term, Eigen::Index> number;
+  std::vector<std::map<Term, Vec3>> all;
+  for (const Index point : points) {
+    for (const auto& [term, gradient] : all.emplace_back(terms_of(fine_, field, point)))
+      number.emplace(term, 0);
+  }
+  Eigen::Index terms = 0;
+  for (auto& [term, at] : number) {
+    at = terms++;
+    part.dofs.insert(part.dofs.end(), term.begin(), term.end());
+  }
+  part.element = points.front() / fine_.points();
+  MatrixXd slopes = MatrixXd::Zero(3 * std::ssize(points), terms);  // times the root of the weight
+  part.G.setZero(3, terms);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double weight = fine_.weight(points[k]);
+    part.volume += weight;
+    for (const auto& [term, gradient] : all[k]) {
+      part.G.col(number[term]) += weight * gradient;
+      for (Eigen::Index axis = 0; axis < 3; ++axis)
+        slopes(axis * std::ssize(points) + static_cast<Eigen::Index>(k), number[term]) =
+            std::sqrt(weight) * gradient[axis];
+    }
+  }
+  part.G /= part.volume;
+  part.K.setZero(3 * terms, 3 * terms);
+  const PointTangent C = tangent_at(fine_.options().law, fine_.constants(part.element), Mat3::Identity(),
+                                    fine_.initial_strain(part.element), TangentKind::exact);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      const auto n = std::ssize(points);
+      const MatrixXd spread = slopes.middleRows(i * n, n).transpose() * slopes.middleRows(j * n, n) -
+                              part.volume * part.G.row(i).transpose() * part.G.row(j);
+      for (Eigen::Index r = 0; r < 3; ++r) {
+        for (Eigen::Index s = 0; s < 3; ++s) {
+          const double factor = C(r + 3 * i, s + 3 * j);
+          if (factor == 0.0) continue;
+          for (Eigen::Index a = 0; a < terms; ++a) {
+            for (Eigen::Index b = 0; b < terms; ++b) part.K(3 * a + r, 3 * b + s) += factor * spread(a, b);
+          }
+        }
+      }
+    }
+  }
+}
+
+CoarseBody::State CoarseBody::state(const Part& part, const VectorXd& q) const {
+  State at;
+  at.u.resize(3, part.G.cols());
+  for (std::size_t k = 0; k < part.dofs.size(); ++k)
+    at.u.data()[k] = part.dofs[k] < 0 ? 0.0 : q[part.dofs[k]];
+  at.F = Mat3::Identity() + at.u * part.G.transpose();
+  at.R = fine_.dimension() == 3 ? nearest_rotation(at.F) : nearest_rotation_in_plane(at.F);
+  at.q = at.R.transpose() * at.u;
+  at.y.resize(3, at.q.cols());
+  Map<VectorXd>(at.y.data(), at.y.size()).noalias() =
+      part.K.selfadjointView<Eigen::Lower>() * Map<const VectorXd>(at.q.data(), at.q.size());
+  const Mat3 U = 0.5 * (at.R.transpose() * at.F + at.F.transpose() * at.R);
+  at.G = (U.trace() * Mat3::Identity() - U).inverse();
+  return at;
+}
+
+double CoarseBody::energy(const VectorXd& q, VectorXd* gradient) const {
+  double sum = 0.0;
+  for (const Part& part : parts_) {
+    const State at = state(part, q);
+    const PointStress stress = stress_at(fine_.options().law, fine_.constants(part.element), at.F,
+                                         fine_.initial_strain(part.element));
+    sum += part.volume * stress.energy + 0.5 * at.q.cwiseProduct(at.y).sum();
+    if (gradient == nullptr) continue;
+    Vec3 torque = Vec3::Zero();
+    for (Eigen::Index term = 0; term < at.q.cols(); ++term) torque += at.q.col(term).cross(at.y.col(term));
+    const Vec3 turn = at.G.transpose() * torque;
+    for (Eigen::Index term = 0; term < at.q.cols(); ++term) {
+      const Vec3 slope = part.G.col(term);
+      const Vec3 force = part.volume * stress.P * slope + at.R * (at.y.col(term) - turn.cross(slope));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Index dof = part.dofs[3 * static_cast<std::size_t>(term) + axis];
+        if (dof >= 0) (*gradient)[dof] += force[static_cast<Eigen::Index>(axis)];
+      }
+    }
+  }
+  return sum;
+}
+
+MatrixXd CoarseBody::tangent(const VectorXd& q) const {
+  MatrixXd K = MatrixXd::Zero(dofs_, dofs_);
+  MatrixXd local, spin, by_turn;
+  for (const Part& part : parts_) {
+    const State at = state(part, q);
+    const Eigen::Index terms = at.q.cols();
+    const PointTangent C = part.volume * tangent_at(fine_.options().law, fine_.constants(part.element), at.F,
+                                                    fine_.initial_strain(part.element), TangentKind::exact);
+    // In the part's frame: the field's change less the turning, and the terms of its first order.
+    spin.resize(3, 3 * terms);      // B
+    by_turn.resize(3 * terms, 3);   // [q]_x, so that the frame's q changes by dq + [q]_x B dq
+    MatrixXd couple(3, 3 * terms);  // [y]_x
+    Mat3 middle = Mat3::Zero();
+    for (Eigen::Index term = 0; term < terms; ++term) {
+      spin.middleCols<3>(3 * term) = at.G * cross_matrix(part.G.col(term));
+      by_turn.middleRows<3>(3 * term) = cross_matrix(at.q.col(term));
+      couple.middleCols<3>(3 * term) = cross_matrix(at.y.col(term));
+      middle +=
+          0.5 * (at.y.col(term) * at.q.col(term).transpose() + at.q.col(term) * at.y.col(term).transpose()) -
+          at.y.col(term).dot(at.q.col(term)) * Mat3::Identity();
+    }
+    const MatrixXd K_turn = part.K.selfadjointView<Eigen::Lower>() * by_turn;
+    const MatrixXd cross = (K_turn.transpose() + couple).transpose() * spin;
+    middle += by_turn.transpose() * K_turn;
+    local = part.K + cross + cross.transpose();
+    local.noalias() += spin.transpose() * (middle * spin);
+    for (Eigen::Index a = 0; a < terms; ++a) {
+      const Vec3 g = part.G.col(a);
+      const Eigen::Matrix<double, 3, 9> T =
+          g.x() * C.topRows<3>() + g.y() * C.middleRows<3>(3) + g.z() * C.bottomRows<3>();
+      for (Eigen::Index b = 0; b < terms; ++b) {
+        const Vec3 h = part.G.col(b);
+        const Mat3 block = at.R * local.block<3, 3>(3 * a, 3 * b) * at.R.transpose() +
+                           h.x() * T.leftCols<3>() + h.y() * T.middleCols<3>(3) + h.z() * T.rightCols<3>();
+        for (std::size_t i = 0; i < 3; ++i) {
+          for (std::size_t j = 0; j < 3; ++j) {
+            const Index row = part.dofs[3 * static_cast<std::size_t>(a) + i],
+                        column = part.dofs[3 * static_cast<std::size_t>(b) + j];
+            if (row >= 0 && column >= 0)
+              K(row, column) += block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          }
+        }
+      }
+    }
+  }
+  return K;
+}
+
+}  // namespace palpate

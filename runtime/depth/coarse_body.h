@@ -1,0 +1,47 @@
+// The elastic energy of a body whose displacement is a coarse field.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "runtime/core/body/coarse_field.h"
+#include "statics/live_body.h"
+
+namespace palpate {
+
+/// E(q) of a body at u = P q, a subspace of its mesh's displacements: mesh nodes follow the field, except
+/// along axes on which they are held. A sum over parts of each cell, with the law at their mean deformation
+/// gradient; what the gradient varies by within a part has the energy of small strain, turned with the part.
+/// The tangent at rest is P^T K P, and the cost does not depend on the mesh.
+class CoarseBody {
+ public:
+  /// `fine` must outlive it.
+  CoarseBody(const LiveBody& fine, const CoarseField& field);
+
+  [[nodiscard]] Eigen::Index dofs() const noexcept { return dofs_; }
+
+  /// E(q) [J]; adds dE/dq [N] to `gradient` unless null.
+  double energy(const Eigen::VectorXd& q, Eigen::VectorXd* gradient) const;
+  /// d^2 E / dq^2 [N/m], without second derivatives of rotations.
+  [[nodiscard]] Eigen::MatrixXd tangent(const Eigen::VectorXd& q) const;
+
+ private:
+  /// Part of a cell, of one material. A term is what a coarse node moves along some axes.
+  struct Part {
+    std::vector<Index> dofs;  // [3 terms] of the coarse field, by axis; -1: held, or not in the plane
+    Index element = 0;        // one of those in it
+    double volume = 0.0;      // [m^3]
+    Eigen::Matrix3Xd G;       // [3 x terms] mean gradients [1/m]
+    Eigen::MatrixXd K;        // [3 terms x 3 terms] of small strain, by the gradients' variation [N/m]
+  };
+  struct State;
+
+  void measure(const CoarseField& field, const std::vector<Index>& points, Part& part) const;
+  [[nodiscard]] State state(const Part& part, const Eigen::VectorXd& q) const;
+
+  const LiveBody& fine_;
+  Eigen::Index dofs_;
+  std::vector<Part> parts_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,480 @@
+#include "runtime/depth/two_levels.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "base/vectors.h"
+#include "statics/polar.h"
+
+namespace palpate {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index most_groups = 12;  // of loaded nodes that are held in place
+constexpr double floor_of_group =
+    1e-5;  // compliance of a group beside its own, as a share of a node's at rest
+constexpr int most_halvings = 30;
+constexpr double most_of_mesh = 0.8;      // dofs of a coarse body, of its mesh's
+constexpr double rounding = 1e-9;         // of the largest q: a step that is not made
+constexpr double least_stiffness = 1e-3;  // of the coarse field in the tick, as a share of that at rest
+constexpr double most_lag = 0.05;         // share of q, in the norm of K_c, by which the tangent of E may lag
+
+/// Groups of points: the group of each, the first ones being those farthest from all before.
+std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
+  std::vector<Index> group(points.size(), 0);
+  std::vector<double> distance(points.size(), std::numeric_limits<double>::infinity());
+  std::size_t next = 0;
+  for (Index g = 0; g < std::min<Index>(most, static_cast<Index>(points.size())); ++g) {
+    const Vec3 centre = points[next];
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double there = (points[k] - centre).squaredNorm();
+      if (there >= distance[k]) continue;
+      distance[k] = there;
+      group[k] = g;
+    }
+    next = static_cast<std::size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+  }
+  return group;
+}
+
+/// (tr U I - U)^-1 of F = R U: the body's spin by the skew part of R^T dF.
+Mat3 spin_of_skew(const Mat3& R, const Mat3& F) {
+  const Mat3 U = 0.5 * (R.transpose() * F + F.transpose() * R);
+  return (U.trace() * Mat3::Identity() - U).inverse();
+}
+
+/// Cholesky's factor of A, or of A with as much of K as it needs to be positive definite.
+Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
+  Eigen::LLT<MatrixXd> factor(A);
+  for (double share = 1e-3; factor.info() != Eigen::Success && share < 1e6; share *= 4.0)
+    factor.compute(A + share * K);
+  return factor;
+}
+
+/// A^-1, or where A is not positive definite that of A with its negative eigenvalues, in the measure of K,
+/// positive: a body that a tool holds in a place where it would not stay by itself.
+MatrixXd positive_inverse(const MatrixXd& A, const MatrixXd& K) {
+  const MatrixXd I = MatrixXd::Identity(A.rows(), A.cols());
+  const Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() == Eigen::Success) return factor.solve(I);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> parts(A, K);
+  const VectorXd inverse = parts.eigenvalues().cwiseAbs().cwiseMax(least_stiffness).cwiseInverse();
+  return parts.eigenvectors() * inverse.asDiagonal() * parts.eigenvectors().transpose();
+}
+
+}  // namespace
+
+/// Constant part of a search: positions, groups and the remainder's compliance of the loaded nodes.
+struct TwoLevels::Contact {
+  std::vector<Vec3> f, u;     // [k]
+  std::vector<Index> group;   // [k]
+  std::vector<double> share;  // [k] of its group
+  Index groups = 0;
+  std::vector<Index> dofs;          // of the coarse field that move the loaded nodes
+  std::vector<Index> place_of_dof;  // [n_q] in `dofs`, -1: none
+};
+
+/// A state in a search.
+struct TwoLevels::Look {
+  double E = 0.0;          // energy of the coarse body
+  VectorXd dE;             // [n_q]
+  double energy = 0.0;     // Phi
+  VectorXd gradient;       // [n_q]
+  std::vector<Mat3> R, G;  // [k]
+  MatrixXd V, MV;          // [3k x d groups] R^T A^T, and M times it
+  MatrixXd S;              // [d groups, d groups] A R M R^T A^T
+  VectorXd f, phi, s;      // [3k] forces, and in the frame of the nodes forces and remainder
+};
+
+TwoLevels::TwoLevels(const CoarseParts& parts, std::shared_ptr<const Greens> greens)
+    : parts_(parts), greens_(std::move(greens)), dimension_(greens_->dimension()) {
+  rest();
+}
+
+/// Calls visit(dof, weight, axis) for P of a stored node.
+template <class Visit>
+void TwoLevels::for_each_weight(Index node, const Visit& visit) const {
+  const CoarseNodes& coarse = *parts_.nodes;
+  const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
+  coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
+                             [&](Index c, double weight, const Vec3&) {
+                               for (Index axis = 0; axis < dimension_; ++axis)
+                                 if (((axes >> axis) & 1U) != 0) visit(dimension_ * c + axis, weight, axis);
+                             });
+}
+
+void TwoLevels::rest() noexcept {
+  q_ = VectorXd::Zero(parts_.K.rows());
+  largest_q_ = 0.0;
+  H_ = tangent_ = parts_.K;
+  q_tangent_ = q_;
+  dE_ = q_;
+  E_ = parts_.body->energy(q_, &dE_);
+  loaded_.clear();
+  forces_.clear();
+  columns_.clear();
+  const auto n = static_cast<std::size_t>(greens_->order());
+  s_.assign(n, 0.0);
+  u_.assign(n, 0.0);
+  turns_.assign(static_cast<std::size_t>(greens_->nodes()), {});
+}
+
+CoarseTurn TwoLevels::turn(Index node, const VectorXd& q, const Vec3& s) const {
+  CoarseTurn turn;
+  const CoarseNodes& nodes = *parts_.nodes;
+  if (!nodes.turns(node)) return turn;
+  Mat3 F = Mat3::Identity();
+  nodes.field.for_each_node(
+      nodes.place[static_cast<std::size_t>(node)], [&](Index k, double, const Vec3& gradient) {
+        F += vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, k) * gradient.transpose();
+      });
+  turn.R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
+  turn.T = turn.R * cross_matrix(s) * spin_of_skew(turn.R, F);
+  return turn;
+}
+
+void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const double> f,
+                             std::span<const double> u, Contact& contact) const {
+  std::vector<Vec3> rest;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    contact.f.push_back(vector_at(f, dimension_, static_cast<Index>(k)));
+    contact.u.push_back(vector_at(u, dimension_, static_cast<Index>(k)));
+    rest.push_back(contact.u.back());
+    // nodes of about one place move together: group by place in the mesh
+    const CoarsePlace& at = parts_.nodes->place[static_cast<std::size_t>(nodes[k])];
+    rest.back() = at.x;
+  }
+  contact.group = grouped(rest, most_groups);
+  contact.groups = nodes.empty() ? 0 : 1 + *std::max_element(contact.group.begin(), contact.group.end());
+  std::vector<double> sum(static_cast<std::size_t>(contact.groups), 0.0);
+  double largest = 0.0;
+  for (const Vec3& force : contact.f) largest = std::max(largest, force.norm());
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    sum[static_cast<std::size_t>(contact.group[k])] +=
+        contact.share.emplace_back(largest > 0.0 ? contact.f[k].norm() + 1e-6 * largest : 1.0);
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    contact.share[k] /= sum[static_cast<std::size_t>(contact.group[k])];
+  contact.place_of_dof.assign(static_cast<std::size_t>(q_.size()), -1);
+  const CoarseNodes& coarse = *parts_.nodes;
+  for (const Index node : nodes) {
+    coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
+                               [&](Index k, double, const Vec3&) {
+                                 for (int axis = 0; axis < dimension_; ++axis) {
+                                   const Index dof = dimension_ * k + axis;
+                                   Index& place = contact.place_of_dof[static_cast<std::size_t>(dof)];
+                                   if (place >= 0) continue;
+                                   place = static_cast<Index>(contact.dofs.size());
+                                   contact.dofs.push_back(dof);
+                                 }
+                               });
+  }
+}
+
+/// `at` has E and dE.
+void TwoLevels::look(const Contact& contact, const VectorXd& q, Look& at) const {
+  const Eigen::Index d = dimension_;
+  const auto k_all = std::ssize(loaded_);
+  at.energy = at.E;
+  at.gradient = at.dE;
+  at.R.assign(loaded_.size(), Mat3::Identity());
+  at.G.assign(loaded_.size(), Mat3::Zero());
+  at.V.setZero(3 * k_all, d * contact.groups);
+  VectorXd f0(3 * k_all), phi0(3 * k_all), along = VectorXd::Zero(3 * k_all),
+                                           A_off = VectorXd::Zero(d * contact.groups);
+  const CoarseNodes& coarse = *parts_.nodes;
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const Index node = loaded_[static_cast<std::size_t>(k)];
+    Mat3 F = Mat3::Identity();
+    Vec3 moved = Vec3::Zero();
+    const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
+    coarse.field.for_each_node(
+        coarse.place[static_cast<std::size_t>(node)], [&](Index c, double weight, const Vec3& gradient) {
+          const Vec3 part = vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, c);
+          F += part * gradient.transpose();
+          moved += weight * part;
+        });
+    for (int axis = 0; axis < 3; ++axis)
+      if (((axes >> axis) & 1U) == 0) moved[axis] = 0.0;
+    Mat3& R = at.R[static_cast<std::size_t>(k)];
+    if (coarse.turns(node)) {
+      R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
+      at.G[static_cast<std::size_t>(k)] = spin_of_skew(R, F);
+    }
+    const Vec3& force = contact.f[static_cast<std::size_t>(k)];
+    f0.segment<3>(3 * k) = force;
+    phi0.segment<3>(3 * k) = R.transpose() * force;
+    along.segment<3>(3 * k) = moved;
+    const Eigen::Index g = contact.group[static_cast<std::size_t>(k)];
+    const double share = contact.share[static_cast<std::size_t>(k)];
+    at.V.block(3 * k, d * g, 3, d) = share * R.transpose().leftCols(d);
+    A_off.segment(d * g, d) += share * (contact.u[static_cast<std::size_t>(k)] - moved).head(d);
+  }
+  at.MV.noalias() = M_ * at.V;
+  const VectorXd s0 = M_ * phi0;
+  at.S.noalias() = at.V.transpose() * at.MV;
+  VectorXd lambda = VectorXd::Zero(d * contact.groups);
+  double by_places = 0.0;
+  if (k_all > 0) {
+    at.S.diagonal().array() += floor_of_group * largest_;
+    const VectorXd r = A_off - at.V.transpose() * s0;
+    const Eigen::LDLT<MatrixXd> factor(at.S);
+    lambda = factor.solve(r);
+    by_places = 0.5 * r.dot(lambda);
+  }
+  at.energy += by_places - f0.dot(along) - 0.5 * phi0.dot(s0);
+  at.s = s0 + at.MV * lambda;
+  at.phi = phi0 + at.V * lambda;
+  at.f = f0;
+  for (Eigen::Index k = 0; k < k_all; ++k)
+    at.f.segment<3>(3 * k).head(d) += contact.share[static_cast<std::size_t>(k)] *
+                                      lambda.segment(d * contact.group[static_cast<std::size_t>(k)], d);
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const Index node = loaded_[static_cast<std::size_t>(k)];
+    const Vec3 force = at.f.segment<3>(3 * k);
+    const Vec3 torque = at.s.segment<3>(3 * k).cross(at.phi.segment<3>(3 * k));
+    const Vec3 v = at.G[static_cast<std::size_t>(k)].transpose() * torque;
+    const Mat3& R = at.R[static_cast<std::size_t>(k)];
+    const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
+    coarse.field.for_each_node(
+        coarse.place[static_cast<std::size_t>(node)], [&](Index c, double weight, const Vec3& gradient) {
+          // B^T of the torque: ([g]_x R^T)^T G^T t = R (G^T t x g)
+          const Vec3 spin = R * v.cross(gradient);
+          for (Eigen::Index axis = 0; axis < d; ++axis) {
+            const bool free = ((axes >> axis) & 1U) != 0;
+            at.gradient[d * c + axis] -= (free ? weight * force[axis] : 0.0) + spin[axis];
+          }
+        });
+  }
+}
+
+MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J) const {
+  const Eigen::Index d = dimension_;
+  MatrixXd H = tangent_;
+  const auto k_all = std::ssize(loaded_);
+  if (k_all == 0) return H;
+  const auto n = std::ssize(contact.dofs);
+  MatrixXd P = MatrixXd::Zero(3 * k_all, n), B = P, FB = P, sB = P;
+  const CoarseNodes& coarse = *parts_.nodes;
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const Index node = loaded_[static_cast<std::size_t>(k)];
+    const Mat3& R = at.R[static_cast<std::size_t>(k)];
+    const Mat3& G = at.G[static_cast<std::size_t>(k)];
+    const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
+    coarse.field.for_each_node(
+        coarse.place[static_cast<std::size_t>(node)], [&](Index c, double weight, const Vec3& gradient) {
+          const Mat3 by = G * cross_matrix(gradient) * R.transpose();
+          for (Eigen::Index axis = 0; axis < d; ++axis) {
+            const Eigen::Index column = contact.place_of_dof[static_cast<std::size_t>(d * c + axis)];
+            if (((axes >> axis) & 1U) != 0) P(3 * k + axis, column) += weight;
+            B.col(column).segment<3>(3 * k) += by.col(axis);
+          }
+        });
+    const Mat3 phi_x = cross_matrix(at.phi.segment<3>(3 * k)), s_x = cross_matrix(at.s.segment<3>(3 * k));
+    FB.middleRows<3>(3 * k) = phi_x * B.middleRows<3>(3 * k);
+    sB.middleRows<3>(3 * k) = s_x * B.middleRows<3>(3 * k);
+  }
+  const MatrixXd MFB = M_ * FB;
+  MatrixXd geometric = FB.transpose() * MFB;
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const Vec3 s = at.s.segment<3>(3 * k), phi = at.phi.segment<3>(3 * k);
+    const Mat3 middle = 0.5 * (s * phi.transpose() + phi * s.transpose()) - s.dot(phi) * Mat3::Identity();
+    geometric += B.middleRows<3>(3 * k).transpose() * middle * B.middleRows<3>(3 * k);
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      H(contact.dofs[static_cast<std::size_t>(i)], contact.dofs[static_cast<std::size_t>(j)]) -=
+          geometric(i, j);
+  }
+  if (J != nullptr) {  // R^T J of the loaded nodes
+    *J = MFB - sB;
+    for (Eigen::Index k = 0; k < k_all; ++k)
+      J->middleRows<3>(3 * k) += at.R[static_cast<std::size_t>(k)].transpose() * P.middleRows<3>(3 * k);
+  }
+  return H;
+}
+
+void TwoLevels::renew_tangent() {
+  if (q_tangent_ == q_) return;
+  tangent_ = parts_.body->tangent(q_);
+  q_tangent_ = q_;
+}
+
+TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const double> f,
+                               std::span<const double> u, double tolerance, int most_steps) {
+  const Eigen::Index d = dimension_;
+  if (!std::equal(nodes.begin(), nodes.end(), loaded_.begin(), loaded_.end())) {
+    loaded_.assign(nodes.begin(), nodes.end());
+    const auto k_all = std::ssize(loaded_);
+    M_.setZero(3 * k_all, 3 * k_all);
+    std::vector<double> row(static_cast<std::size_t>(d * d * k_all));
+    const CoarseNodes& coarse = *parts_.nodes;
+    MatrixXd P = MatrixXd::Zero(q_.size(), d * k_all);
+    for (Eigen::Index k = 0; k < k_all; ++k) {
+      const Index node = loaded_[static_cast<std::size_t>(k)];
+      greens_->gather(node, loaded_, row);
+      for (Eigen::Index i = 0; i < d; ++i) {
+        for (Eigen::Index c = 0; c < d * k_all; ++c)
+          M_(3 * k + i, 3 * (c / d) + c % d) = row[static_cast<std::size_t>(i * d * k_all + c)];
+      }
+      const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
+      coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
+                                 [&](Index c, double weight, const Vec3&) {
+                                   for (Eigen::Index axis = 0; axis < d; ++axis)
+                                     if (((axes >> axis) & 1U) != 0) P(d * c + axis, d * k + axis) = weight;
+                                 });
+    }
+    largest_ = k_all > 0 ? M_.diagonal().maxCoeff() : 0.0;
+    const Eigen::SparseMatrix<double> sparse = P.sparseView();
+    const MatrixXd KP = coarse.compliance * sparse;
+    const MatrixXd by_field = sparse.transpose() * KP;
+    for (Eigen::Index a = 0; a < d * k_all; ++a) {
+      for (Eigen::Index b = 0; b < d * k_all; ++b)
+        M_(3 * (a / d) + a % d, 3 * (b / d) + b % d) -= by_field(a, b);
+    }
+  }
+  Contact contact;
+  make_contact(nodes, f, u, contact);
+  TwoLevelReport report;
+  Look at, tried;
+  at.E = E_;
+  at.dE = dE_;
+  look(contact, q_, at);
+  MatrixXd J;
+  const double smallest = std::numeric_limits<double>::min();
+  for (;; ++report.steps) {
+    const VectorXd since = q_ - q_tangent_;
+    if (since.dot(parts_.K * since) > most_lag * most_lag * q_.dot(parts_.K * q_)) renew_tangent();
+    H_ = hessian(contact, at, &J);
+    MatrixXd A = H_;
+    if (!loaded_.empty()) {
+      const MatrixXd AJ = at.V.transpose() * J;
+      const MatrixXd held = AJ.transpose() * Eigen::LDLT<MatrixXd>(at.S).solve(AJ);
+      for (Eigen::Index i = 0; i < held.rows(); ++i) {
+        for (Eigen::Index j = 0; j < held.cols(); ++j)
+          A(contact.dofs[static_cast<std::size_t>(i)], contact.dofs[static_cast<std::size_t>(j)]) +=
+              held(i, j);
+      }
+    }
+    const VectorXd step = positive_factor(A, parts_.K).solve(-at.gradient);
+    const double size = std::sqrt(std::max(step.dot(parts_.K * step), 0.0));
+    largest_q_ = std::max(largest_q_, std::sqrt(std::max(q_.dot(parts_.K * q_), 0.0)));
+    report.residual = size / std::max(largest_q_, smallest);
+    report.converged = report.residual <= tolerance;
+    if (report.residual <= rounding || report.steps == most_steps) break;
+    const double slope = at.gradient.dot(step);
+    double share = 1.0;
+    bool is_lower = false;
+    VectorXd q;
+    for (int k = 0; k < most_halvings && !is_lower; ++k, share *= is_lower ? 1.0 : 0.5) {
+      q = q_ + share * step;
+      tried.dE = VectorXd::Zero(q.size());
+      tried.E = parts_.body->energy(q, &tried.dE);
+      look(contact, q, tried);
+      is_lower = tried.energy <= at.energy + 1e-4 * share * slope ||
+                 (std::isfinite(tried.energy) && tried.gradient.norm() < 0.5 * at.gradient.norm());
+    }
+    if (!is_lower) break;
+    q_ = q;
+    std::swap(at, tried);
+    if (report.converged) break;
+  }
+  E_ = at.E;
+  dE_ = at.dE;
+  forces_.clear();
+  for (Eigen::Index k = 0; k < std::ssize(loaded_); ++k) {
+    for (Eigen::Index axis = 0; axis < d; ++axis) forces_.push_back(at.f[3 * k + axis]);
+  }
+  find_remainder(at);
+  find_displacement();
+  columns_.clear();
+  for (Eigen::Index k = 0; k < std::ssize(loaded_); ++k) {
+    CoarseColumn& column =
+        columns_.emplace_back(loaded_[static_cast<std::size_t>(k)], MatrixXd::Zero(q_.size(), d));
+    const MatrixXd turned = at.R[static_cast<std::size_t>(k)] * J.middleRows<3>(3 * k);
+    for (std::size_t i = 0; i < contact.dofs.size(); ++i)
+      column.J.row(contact.dofs[i]) = turned.col(static_cast<Eigen::Index>(i)).head(d).transpose();
+  }
+  return report;
+}
+
+/// s of all stored nodes: (Xi - P K_c^-1 P^T) R^T f.
+void TwoLevels::find_remainder(const Look& at) {
+  const CoarseNodes& coarse = *parts_.nodes;
+  std::fill(s_.begin(), s_.end(), 0.0);
+  if (loaded_.empty()) return;
+  const Eigen::Index d = dimension_;
+  std::vector<double> phi(forces_.size());
+  VectorXd P_f = VectorXd::Zero(q_.size());
+  for (std::size_t k = 0; k < loaded_.size(); ++k) {
+    const Vec3 force = at.phi.segment<3>(3 * static_cast<Eigen::Index>(k));
+    set_vector(phi, dimension_, static_cast<Index>(k), force);
+    for_each_weight(loaded_[k],
+                    [&](Index dof, double weight, Eigen::Index axis) { P_f[dof] += weight * force[axis]; });
+  }
+  greens_->displacement(loaded_, phi, s_);
+  const VectorXd q = coarse.compliance * P_f;
+  for (Index node = 0; node < greens_->nodes(); ++node) {
+    double* s = s_.data() + d * node;
+    for_each_weight(node, [&](Index dof, double weight, Eigen::Index axis) { s[axis] -= weight * q[dof]; });
+  }
+}
+
+void TwoLevels::find_displacement() {
+  for (Index node = 0; node < greens_->nodes(); ++node) {
+    const Vec3 s = vector_at(s_, dimension_, node);
+    const CoarseTurn& turned = turns_[static_cast<std::size_t>(node)] = turn(node, q_, s);
+    Vec3 moved = Vec3::Zero();
+    for_each_weight(node,
+                    [&](Index dof, double weight, Eigen::Index axis) { moved[axis] += weight * q_[dof]; });
+    set_vector(u_, dimension_, node, moved + turned.R * s);
+  }
+}
+
+TwoLevelState TwoLevels::state(std::vector<Index> near) {
+  H_ -= tangent_;
+  renew_tangent();
+  H_ += tangent_;
+  return {.nodes = parts_.nodes,
+          .turns = turns_,
+          .H_inverse = positive_inverse(H_, parts_.K),
+          .columns = columns_,
+          .near = std::move(near)};
+}
+
+CoarseParts make_coarse_parts(std::shared_ptr<const LiveBody> fine, std::span<const Index> stored_nodes,
+                              Index most_dofs) {
+  const Mesh& mesh = fine->mesh();
+  const auto d = static_cast<std::size_t>(fine->dimension());
+  std::vector<Vec3> free;
+  std::vector<std::uint8_t> axes(mesh.nodes.size(), 0);
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    for (std::size_t axis = 0; axis < d; ++axis)
+      if (fine->free_of_dof()[d * node + axis] >= 0) axes[node] |= 1U << axis;
+    if (axes[node] != 0) free.push_back(mesh.nodes[node]);
+  }
+  // A field as fine as the mesh has slopes at the nodes that nodes do not decide.
+  const Index most =
+      std::min(most_dofs, static_cast<Index>(most_of_mesh * static_cast<double>(fine->free_dofs())));
+  auto nodes = std::make_shared<CoarseNodes>(CoarseNodes{
+      .field = coarse_field(fine->dimension(), free, most), .place = {}, .axes = {}, .compliance = {}});
+  for (const Index node : stored_nodes) {
+    nodes->place.push_back(nodes->field.place(mesh.nodes[static_cast<std::size_t>(node)]));
+    nodes->axes.push_back(axes[static_cast<std::size_t>(node)]);
+  }
+  CoarseParts parts{.fine = std::move(fine), .body = nullptr, .nodes = nullptr, .K = {}};
+  parts.body = std::make_unique<const CoarseBody>(*parts.fine, nodes->field);
+  parts.K = parts.body->tangent(VectorXd::Zero(parts.body->dofs()));
+  nodes->compliance = Eigen::LLT<MatrixXd>(parts.K).solve(MatrixXd::Identity(parts.K.rows(), parts.K.cols()));
+  parts.nodes = std::move(nodes);
+  return parts;
+}
+
+}  // namespace palpate

@@ -1,0 +1,92 @@
+// Balance of a body on two levels: a coarse field with large rotation, and the linear remainder.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/core/body/two_level_greens.h"
+#include "runtime/depth/coarse_body.h"
+
+namespace palpate {
+
+/// A coarse body, and how the Green's functions' nodes follow it.
+struct CoarseParts {
+  std::shared_ptr<const LiveBody> fine;
+  std::unique_ptr<const CoarseBody> body;
+  std::shared_ptr<const CoarseNodes> nodes;
+  Eigen::MatrixXd K;  ///< K_c, tangent at rest [N/m]
+};
+
+/// Statistics of a search for balance.
+struct TwoLevelReport {
+  bool converged = false;
+  int steps = 0;          ///< Newton's
+  double residual = 0.0;  ///< last change of q relative to the largest q so far, in the norm of K_c
+};
+
+/// Displacement on two levels, u_i = P_i q + R_i s_i with s = (Xi - P K_c^-1 P^T) R^T f: q is a coarse field
+/// of large rotation, R_i its rotation at node i, and s what small strain leaves (docs/depth.md). For
+/// given positions of the loaded nodes it is a minimisation in q; without rotation it is u = Xi f.
+class TwoLevels {
+ public:
+  /// Both must outlive it.
+  TwoLevels(const CoarseParts& parts, std::shared_ptr<const Greens> greens);
+
+  void rest() noexcept;
+
+  /// Goes on to the balance under forces f [dm] on m stored nodes that are held at displacements u [dm] on
+  /// average: forces are changed in groups until groups of nodes are there, one node each while they are few.
+  TwoLevelReport find(std::span<const Index> nodes, std::span<const double> f, std::span<const double> u,
+                      double tolerance, int most_steps);
+
+  /// Nodes loaded in the last balance, each once, and their forces [dm] [N].
+  [[nodiscard]] std::span<const Index> loaded() const noexcept { return loaded_; }
+  [[nodiscard]] const std::vector<double>& forces() const noexcept { return forces_; }
+  /// Displacement of all stored nodes at the balance [n] [m].
+  [[nodiscard]] const std::vector<double>& displacement() const noexcept { return u_; }
+  /// Rotation of each stored node, and what it does to the remainder [nodes].
+  [[nodiscard]] const std::vector<CoarseTurn>& turns() const noexcept { return turns_; }
+  /// Compliance at the balance: the change of displacements by forces. `near`: TwoLevelState::near.
+  [[nodiscard]] TwoLevelState state(std::vector<Index> near);
+
+ private:
+  struct Contact;
+  struct Look;
+
+  [[nodiscard]] CoarseTurn turn(Index node, const Eigen::VectorXd& q, const Vec3& s) const;
+  void renew_tangent();
+  template <class Visit>
+  void for_each_weight(Index node, const Visit& visit) const;
+  void find_remainder(const Look& at);
+  void find_displacement();
+  void make_contact(std::span<const Index> nodes, std::span<const double> f, std::span<const double> u,
+                    Contact& contact) const;
+  void look(const Contact& contact, const Eigen::VectorXd& q, Look& at) const;
+  [[nodiscard]] Eigen::MatrixXd hessian(const Contact& contact, const Look& at, Eigen::MatrixXd* J) const;
+
+  const CoarseParts& parts_;
+  std::shared_ptr<const Greens> greens_;
+  int dimension_;
+  Eigen::VectorXd q_, q_tangent_;  // q_tangent_: where `tangent_` is that of E
+  Eigen::MatrixXd tangent_;
+  double largest_q_ = 0.0;  // so far, in the norm of K_c
+  double E_ = 0.0;          // energy of the coarse body at q_, and its derivative
+  Eigen::VectorXd dE_;
+  std::vector<Index> loaded_;
+  std::vector<double> forces_;
+  double largest_ = 0.0;  // compliance of a loaded node at rest [m/N]
+  Eigen::MatrixXd M_;     // [3k x 3k] remainder's compliance of `loaded_`
+  Eigen::MatrixXd H_;     // of the last balance
+  std::vector<CoarseColumn> columns_;
+  std::vector<double> s_, u_;  // [n] remainder and displacement of all stored nodes
+  std::vector<CoarseTurn> turns_;
+};
+
+/// Makes the coarse body of a mesh whose stored nodes are given, with at most `most_dofs` and 0.8 of the
+/// mesh's dofs.
+CoarseParts make_coarse_parts(std::shared_ptr<const LiveBody> fine, std::span<const Index> stored_nodes,
+                              Index most_dofs);
+
+}  // namespace palpate

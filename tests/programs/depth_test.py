@@ -1,0 +1,126 @@
+"""Bodies on two levels, which turn and bend far, through palpate-runtime play --depth yes."""
+
+import json
+import math
+import unittest
+
+import numpy
+
+from programs import MODELS, RUNTIME, ProgramTest, palpate, run
+
+LENGTH, HEIGHT, RADIUS = 0.08, 0.01, 0.003
+TONGUE = """name = "tongue"
+[geometry]
+box = { size = [0.08, 0.01, 0.01], cells = [16, 2, 2] }
+[mesh]
+element = "hex8"
+[material]
+youngs_modulus = 5.0e3
+poissons_ratio = 0.3
+density = 1000.0
+[[fixed]]
+lowest = { axis = "x", percent = 1 }
+[storage]
+scope = "surface"
+precision = "double"
+"""
+
+
+def bend(degrees, seconds):
+    """A ball bends the tongue down to an arc, and waits for as long again."""
+    rows = []
+    for k in range(201):
+        angle = math.radians(degrees) * max(k, 1e-3) / 200
+        turned, out = 0.9 * angle, 0.5 * HEIGHT + RADIUS + (2e-4 if k == 0 else 0.0)  # it begins outside
+        x = LENGTH / angle * math.sin(turned) + out * math.sin(turned)
+        z = 0.5 * HEIGHT - LENGTH / angle * (1 - math.cos(turned)) + out * math.cos(turned)
+        rows.append((seconds * k / 200, x, z))
+    rows.append((2 * seconds, *rows[-1][1:]))
+    return "t,x,y,z\n" + "".join(f"{t},{x},0.005,{z}\n" for t, x, z in rows)
+
+
+class Depth(ProgramTest):
+    def play(self, file, degrees, *arguments, seconds=1.0, radius=RADIUS):
+        path = self.write("bend.csv", bend(degrees, seconds))
+        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--tool", f"sphere:{radius}", "--report", "-", "--record", "bend.mcap", "--force",
+                     *arguments, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        recording = palpate.read(self.folder / "bend.mcap")
+        return numpy.linalg.norm(recording["force"], axis=1), json.loads(result.stdout), result.stderr
+
+    def test_it_feels_like_the_corotational_body_where_small_strain_does_not(self):
+        file = self.bake(TONGUE)
+        deep, report, said = self.play(file, 60, "--depth", "yes")
+        live, _, _ = self.play(file, 60, "--solver", "corotational", "--mass-damping", "20")
+        linear, of_linear, _ = self.play(file, 60)
+        print(f"at the end: corotational {live[-1]:.5f} N, deep {deep[-1] / live[-1] - 1:+.2%}, linear {linear[-1] / live[-1] - 1:+.2%}")
+        self.assertAlmostEqual(deep[-1] / live[-1], 1.0, delta=0.05)
+        self.assertGreater(abs(linear[-1] / live[-1] - 1.0), 0.2)
+        self.assertEqual(report["dynamics"], {"method": "none", "contact": "quasi-static", "steps": report["dynamics"]["steps"], "longest_step_s": report["dynamics"]["longest_step_s"]})
+        self.assertGreater(report["depth"]["largest_rotation_deg"], 30)
+        self.assertLess(report["depth"]["last_residual"], 1e-3)
+        self.assertAlmostEqual(report["surface"]["studied_rotation_deg"], 90)
+        self.assertAlmostEqual(of_linear["surface"]["studied_rotation_deg"], 19)
+        self.assertGreater(of_linear["surface"]["last_rotation_deg"], 19)
+        self.assertNotIn("depth", of_linear)
+        self.assertIn("depth: the body turned", said)
+
+    def test_compressed_bodies_are_felt_as_others(self):
+        plain = self.bake(TONGUE)
+        of_plain, _, _ = self.play(plain, 40, "--depth", "yes", seconds=0.3)
+        plain.unlink()
+        compressed = self.bake(TONGUE.replace('precision = "double"', 'compression = "h2"\ntolerance = 1e-3'))
+        of_compressed, report, _ = self.play(compressed, 40, "--depth", "yes", seconds=0.3)
+        self.assertLess(report["depth"]["last_residual"], 1e-3)
+        self.assertGreater(of_plain[-1], 0)
+        self.assertAlmostEqual(of_compressed[-1] / of_plain[-1], 1.0, delta=1e-4)
+
+    def test_without_it_nothing_is_another(self):
+        file = self.bake(TONGUE)
+        plain, _, _ = self.play(file, 20, seconds=0.2)
+        off, _, _ = self.play(file, 20, "--depth", "no", seconds=0.2)
+        self.assertGreater(plain[-1], 0)
+        numpy.testing.assert_array_equal(plain, off)
+
+    def test_runs_are_equal_and_replay(self):
+        file = self.bake(TONGUE)
+        one, _, _ = self.play(file, 40, "--depth", "yes", seconds=0.2)
+        self.write("keep.mcap", "")
+        (self.folder / "bend.mcap").rename(self.folder / "keep.mcap")
+        other, _, _ = self.play(file, 40, "--depth", "yes", seconds=0.2)
+        self.assertGreater(one[-1], 0)
+        numpy.testing.assert_array_equal(one, other)
+        result = run(RUNTIME, "play", file, "--device", "replay:keep.mcap", "--fast", "--report", "-", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads(result.stdout)["replay"]["different_ticks"], 0)
+
+    def test_what_does_not_go_with_it_is_refused(self):
+        file = self.bake(TONGUE)
+        path = self.write("bend.csv", bend(20, 0.1))
+        for arguments, words in ((("--solver", "corotational"), "a live solver turns by itself"), (("--contact", "dynamic"), "has no inertia"),
+                                 (("--overlay", "r=2,rings=1"), "patches are of the body at rest")):
+            result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--depth", "yes", *arguments, cwd=self.folder)
+            self.assertNotEqual(result.returncode, 0)
+            self.assertIn(words, result.stderr)
+            self.assertIn("--depth", result.stderr)
+
+    def test_a_small_ball_on_a_fine_liver(self):
+        """Small strain is 9 to 16 % too stiff in this press (docs/measurements/live.md#depth)."""
+        image = MODELS / "liver" / "liver.inr.gz"
+        if not image.exists():
+            self.skipTest("the liver's image is not there: scripts/demo gets it")
+        text = (MODELS / "liver" / "model.toml").read_text().replace("edge_length = 0.0055", "edge_length = 0.0085").replace('"layers"\nlayers = 2', '"surface"')
+        file = self.bake(text.replace('"liver.inr.gz"', f'"{image}"'))
+        reports = []
+        for depth in ("yes", "no"):
+            result = run(RUNTIME, "play", file, "--device", f"script:{MODELS / 'liver' / 'palpation.csv'}", "--fast", "--tool", "sphere:0.008", "--depth", depth,
+                         "--report", "-", cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            reports.append(json.loads(result.stdout))
+        deep, linear = reports
+        self.assertEqual((deep["status_ticks"]["result_not_finite"], deep["status_ticks"]["not_converged"]), (0, 0))
+        self.assertAlmostEqual(linear["largest_force_N"] / deep["largest_force_N"], 1.125, delta=0.035)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,93 @@
+// Bodies on two levels under the tick.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "runtime/background/motion_source.h"
+#include "runtime/background/two_level_motion.h"
+#include "runtime/core/tick/step.h"
+#include "runtime/core/tick/surface_motion.h"
+#include "runtime/depth/deep_model.h"
+#include "tests/support/bodies/bent_bodies.h"
+#include "tests/support/live_session.h"
+
+namespace palpate::two_level_tick_test {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0, radius = 0.003;
+
+/// Where a ball is that bends a cantilever down to an arc: it presses on the upper side, at 0.9 of the
+/// length.
+Vec3 on_arc(double angle) {
+  const double s = 0.9 * test::bent_length, k = std::max(angle, 1e-9) / test::bent_length;
+  const double turned = k * s, out = 0.5 * test::bent_height + radius;
+  return Vec3(std::sin(turned) / k + out * std::sin(turned),
+              0.5 * test::bent_height - (1.0 - std::cos(turned)) / k + out * std::cos(turned), 0.0);
+}
+
+struct Played {
+  double force = 0.0;       // at the end [N]
+  double largest_jump = 0;  // of the force from tick to tick [N]
+  double angle = 0.0;       // of the end face [rad]
+  double residual = 1.0;    // of a body on two levels at the end
+};
+
+/// Bends a body by a ball and waits.
+Played play(const Body& body, double angle, int ticks, int wait) {
+  State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
+  std::unique_ptr<MotionSource> source;
+  if (body.contact_model() != ContactModel::quasi_static)
+    source = std::make_unique<MotionSource>(body, state, MotionSourceOptions{.in_background = false});
+  Played played;
+  for (int k = 0; k < ticks + wait; ++k) {
+    if (source) source->receive(state);
+    step(body, state, {.position = on_arc(angle * std::min(1.0, static_cast<double>(k) / ticks))});
+    if (source) source->post(state);
+    const double now = state.tools[0].wrench.force.norm();
+    played.largest_jump = std::max(played.largest_jump, std::abs(now - played.force));
+    played.force = now;
+  }
+  std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
+  surface_displacement(body, state, u);
+  const test::EndFace face(body.model().mesh);
+  played.angle = -face.angle(test::places_of(body, u));
+  if (body.contact_model() == ContactModel::two_level)
+    played.residual = dynamic_cast<const TwoLevelMotion&>(source->stepper()).telling().last_residual;
+  return played;
+}
+
+// The force on the tool and the surface are those of a corotational body, bent by the same ball.
+TEST(TwoLevelTick, FeelsLikeTheCorotationalBody) {
+  const Model model = test::bent_model(ElementType::quad4);
+  const Body deep(deep_model(model), {}, 1, ContactModel::two_level), linear{Model(model)};
+  const Body live = test::live_session(model, {.solver = LiveLaw::corotational, .mass_damping = 20.0});
+  for (const double angle : {10.0, 45.0, 80.0, 120.0}) {
+    const Played by_levels = play(deep, angle * degree, 2000, 500),
+                 by_live = play(live, angle * degree, 1000, 1000),
+                 by_linear = play(linear, angle * degree, 2000, 100);
+    std::printf(
+        "%g degrees: end face at %.1f, %.1f, %.1f; force %.5g corotational, two levels %+.2f %%, linear "
+        "%+.2f "
+        "%%; jump %.2g %%\n",
+        angle, by_live.angle / degree, by_levels.angle / degree, by_linear.angle / degree, by_live.force,
+        100 * (by_levels.force / by_live.force - 1), 100 * (by_linear.force / by_live.force - 1),
+        100 * by_levels.largest_jump / by_levels.force);
+    EXPECT_LT(by_levels.residual, 1e-5);
+    EXPECT_LT(by_levels.largest_jump, 0.005 * by_levels.force);
+    EXPECT_NEAR(by_levels.force / by_live.force, 1.0, 0.05);
+    EXPECT_NEAR(by_levels.angle / by_live.angle, 1.0, 0.02);
+  }
+}
+
+TEST(TwoLevelTick, TwoRunsAreEqual) {
+  const Model model = test::bent_model(ElementType::quad4);
+  const Body body(deep_model(model), {}, 1, ContactModel::two_level);
+  const Played one = play(body, 60.0 * degree, 300, 50), other = play(body, 60.0 * degree, 300, 50);
+  EXPECT_EQ(one.force, other.force);
+  EXPECT_EQ(one.largest_jump, other.largest_jump);
+}
+
+}  // namespace
+}  // namespace palpate::two_level_tick_test
