@@ -11,10 +11,13 @@
 namespace palpate {
 namespace {
 
-constexpr double tolerance = 1e-5;    // change of q in Newton's last step, of q
-constexpr int most_steps = 12;        // Newton's in a job
-constexpr double most_behind = 0.03;  // [rad] by which W may lag
-constexpr double most_wrong = 0.1;    // error of W, as a fraction of a step's displacement of loaded nodes
+constexpr double tolerance = 1e-5;      // change of q in Newton's last step, of q
+constexpr int most_steps = 12;          // Newton's in a job
+constexpr double most_residual = 1e-2;  // of a balance that is used
+constexpr int most_failures = 5;        // until the search begins anew
+constexpr double most_of_cell = 0.3;    // of its edge, that a node moves in a job
+constexpr double most_behind = 0.03;    // [rad] by which W may lag
+constexpr double most_wrong = 0.1;      // error of W, as a fraction of a step's displacement of loaded nodes
 constexpr std::size_t nodes_beside = 60;  // that a tool comes to meet until the next job
 constexpr double least_wrong = 1e-6;      // fraction of their displacement below which it is negligible
 
@@ -50,6 +53,7 @@ void TwoLevelMotion::rest() noexcept {
   levels_.rest();
   std::fill(R_renewed_.begin(), R_renewed_.end(), Mat3::Identity());
   renewed_ = mesh_ = nullptr;
+  failures_ = 0;
   for (std::vector<double>* all : {&x_, &x_before_, &without_}) std::fill(all->begin(), all->end(), 0.0);
   const std::lock_guard lock(mutex_);
   telling_ = {};
@@ -76,17 +80,38 @@ void TwoLevelMotion::take_load(const NodalLoad& load) {
   places_.assign(f_.size(), 0.0);
   if (nodes_.empty()) return;
   now().displacement(nodes_, f_, ranges, places_);
+  // A place far from where the last balance had the node is beyond what the tick's linear model knows.
+  const double most = most_of_cell * parts_.nodes->field.edge();
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const auto at = static_cast<Index>(k);
-    set_vector(places_, d, at, vector_at(places_, d, at) + vector_at(without_, d, nodes_[k]));
+    const Vec3 last = vector_at(levels_.displacement(), d, nodes_[k]);
+    const Vec3 moved = vector_at(places_, d, at) + vector_at(without_, d, nodes_[k]) - last;
+    set_vector(places_, d, at, last + std::min(1.0, most / std::max(moved.norm(), 1e-300)) * moved);
   }
+}
+
+/// Goes on to the balance. Where it is not found, the last one holds; after some failures the search begins
+/// from rest.
+TwoLevelReport TwoLevelMotion::find() {
+  if (failures_ == most_failures) levels_.rest();
+  TwoLevels last = levels_;
+  const TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
+  const std::vector<double>& forces = levels_.forces();
+  const bool is_finite = std::all_of(forces.begin(), forces.end(), [](double f) { return std::isfinite(f); });
+  if (is_finite && report.residual < most_residual) {
+    failures_ = 0;
+  } else {
+    failures_ = failures_ < most_failures ? failures_ + 1 : 1;
+    levels_ = std::move(last);
+  }
+  return report;
 }
 
 void TwoLevelMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
   std::swap(x_, x_before_);
   try {
     take_load(job.load);
-    const TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
+    const TwoLevelReport report = find();
     std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
     shift_.clear();
     if (must_renew()) renew();

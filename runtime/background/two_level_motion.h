@@ -42,6 +42,7 @@ class TwoLevelMotion final : public MotionStepper {
   /// own.
   [[nodiscard]] const Greens& now() const noexcept { return mesh_ != nullptr ? *mesh_ : body_.greens(); }
   void take_load(const NodalLoad& load);
+  TwoLevelReport find();
   [[nodiscard]] bool must_renew() const;
   [[nodiscard]] std::vector<Index> near_nodes() const;
   void renew();
@@ -50,6 +51,7 @@ class TwoLevelMotion final : public MotionStepper {
   const Body& body_;
   CoarseParts parts_;
   TwoLevels levels_;
+  int failures_ = 0;                                 // searches in a row that found no balance
   std::vector<Index> nodes_;                         // loaded in the job, each once
   std::vector<double> f_, places_;                   // [d nodes_] their forces and displacements in the tick
   std::vector<Mat3> R_renewed_;                      // [stored] rotations of W

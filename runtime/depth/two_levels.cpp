@@ -1,7 +1,6 @@
 #include "runtime/depth/two_levels.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -22,10 +21,11 @@ constexpr Index most_groups = 12;  // of loaded nodes that are held in place
 constexpr double floor_of_group =
     1e-5;  // compliance of a group beside its own, as a share of a node's at rest
 constexpr int most_halvings = 30;
-constexpr double most_of_mesh = 0.8;      // dofs of a coarse body, of its mesh's
-constexpr double rounding = 1e-9;         // of the largest q: a step that is not made
-constexpr double least_stiffness = 1e-3;  // of the coarse field in the tick, as a share of that at rest
-constexpr double most_lag = 0.05;         // share of q, in the norm of K_c, by which the tangent of E may lag
+constexpr double most_of_cell = 0.3;     // of its edge, by which a coarse node moves in a step at most
+constexpr double most_of_mesh = 0.8;     // dofs of a coarse body, of its mesh's
+constexpr double rounding = 1e-9;        // of the largest q: a step that is not made
+constexpr double least_stiffness = 0.2;  // of the coarse field in the tick, as a share of that at rest
+constexpr double most_lag = 0.05;        // share of q, in the norm of K_c, by which the tangent of E may lag
 
 /// Groups of points: the group of each, the first ones being those farthest from all before.
 std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
@@ -59,15 +59,17 @@ Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
   return factor;
 }
 
-/// A^-1, or where A is not positive definite that of A with its negative eigenvalues, in the measure of K,
-/// positive: a body that a tool holds in a place where it would not stay by itself.
-MatrixXd positive_inverse(const MatrixXd& A, const MatrixXd& K) {
-  const MatrixXd I = MatrixXd::Identity(A.rows(), A.cols());
-  const Eigen::LLT<MatrixXd> factor(A);
-  if (factor.info() == Eigen::Success) return factor.solve(I);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> parts(A, K);
-  const VectorXd inverse = parts.eigenvalues().cwiseAbs().cwiseMax(least_stiffness).cwiseInverse();
-  return parts.eigenvectors() * inverse.asDiagonal() * parts.eigenvectors().transpose();
+/// A^-1, or where A is not positive definite (A + share K)^-1 with a share by which no field is softer than
+/// `least_stiffness` of that at rest: a tool holds a body where it would not stay by itself.
+MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
+  double share = 0.0;
+  Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success) {
+    while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
+      share = std::max(0.1, 1.5 * share);
+    factor.compute(A + share * K);
+  }
+  return factor.solve(MatrixXd::Identity(A.rows(), A.cols()));
 }
 
 }  // namespace
@@ -95,14 +97,14 @@ struct TwoLevels::Look {
 };
 
 TwoLevels::TwoLevels(const CoarseParts& parts, std::shared_ptr<const Greens> greens)
-    : parts_(parts), greens_(std::move(greens)), dimension_(greens_->dimension()) {
+    : parts_(&parts), greens_(std::move(greens)), dimension_(greens_->dimension()) {
   rest();
 }
 
 /// Calls visit(dof, weight, axis) for P of a stored node.
 template <class Visit>
 void TwoLevels::for_each_weight(Index node, const Visit& visit) const {
-  const CoarseNodes& coarse = *parts_.nodes;
+  const CoarseNodes& coarse = *parts_->nodes;
   const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
   coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
                              [&](Index c, double weight, const Vec3&) {
@@ -112,12 +114,12 @@ void TwoLevels::for_each_weight(Index node, const Visit& visit) const {
 }
 
 void TwoLevels::rest() noexcept {
-  q_ = VectorXd::Zero(parts_.K.rows());
+  q_ = VectorXd::Zero(parts_->K.rows());
   largest_q_ = 0.0;
-  H_ = tangent_ = parts_.K;
+  H_ = tangent_ = parts_->K;
   q_tangent_ = q_;
   dE_ = q_;
-  E_ = parts_.body->energy(q_, &dE_);
+  E_ = parts_->body->energy(q_, &dE_);
   loaded_.clear();
   forces_.clear();
   columns_.clear();
@@ -129,7 +131,7 @@ void TwoLevels::rest() noexcept {
 
 CoarseTurn TwoLevels::turn(Index node, const VectorXd& q, const Vec3& s) const {
   CoarseTurn turn;
-  const CoarseNodes& nodes = *parts_.nodes;
+  const CoarseNodes& nodes = *parts_->nodes;
   if (!nodes.turns(node)) return turn;
   Mat3 F = Mat3::Identity();
   nodes.field.for_each_node(
@@ -149,7 +151,7 @@ void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const doubl
     contact.u.push_back(vector_at(u, dimension_, static_cast<Index>(k)));
     rest.push_back(contact.u.back());
     // nodes of about one place move together: group by place in the mesh
-    const CoarsePlace& at = parts_.nodes->place[static_cast<std::size_t>(nodes[k])];
+    const CoarsePlace& at = parts_->nodes->place[static_cast<std::size_t>(nodes[k])];
     rest.back() = at.x;
   }
   contact.group = grouped(rest, most_groups);
@@ -163,7 +165,7 @@ void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const doubl
   for (std::size_t k = 0; k < nodes.size(); ++k)
     contact.share[k] /= sum[static_cast<std::size_t>(contact.group[k])];
   contact.place_of_dof.assign(static_cast<std::size_t>(q_.size()), -1);
-  const CoarseNodes& coarse = *parts_.nodes;
+  const CoarseNodes& coarse = *parts_->nodes;
   for (const Index node : nodes) {
     coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
                                [&](Index k, double, const Vec3&) {
@@ -189,7 +191,7 @@ void TwoLevels::look(const Contact& contact, const VectorXd& q, Look& at) const 
   at.V.setZero(3 * k_all, d * contact.groups);
   VectorXd f0(3 * k_all), phi0(3 * k_all), along = VectorXd::Zero(3 * k_all),
                                            A_off = VectorXd::Zero(d * contact.groups);
-  const CoarseNodes& coarse = *parts_.nodes;
+  const CoarseNodes& coarse = *parts_->nodes;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
     Mat3 F = Mat3::Identity();
@@ -262,7 +264,7 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
   if (k_all == 0) return H;
   const auto n = std::ssize(contact.dofs);
   MatrixXd P = MatrixXd::Zero(3 * k_all, n), B = P, FB = P, sB = P;
-  const CoarseNodes& coarse = *parts_.nodes;
+  const CoarseNodes& coarse = *parts_->nodes;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
     const Mat3& R = at.R[static_cast<std::size_t>(k)];
@@ -303,7 +305,7 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
 
 void TwoLevels::renew_tangent() {
   if (q_tangent_ == q_) return;
-  tangent_ = parts_.body->tangent(q_);
+  tangent_ = parts_->body->tangent(q_);
   q_tangent_ = q_;
 }
 
@@ -315,7 +317,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
     const auto k_all = std::ssize(loaded_);
     M_.setZero(3 * k_all, 3 * k_all);
     std::vector<double> row(static_cast<std::size_t>(d * d * k_all));
-    const CoarseNodes& coarse = *parts_.nodes;
+    const CoarseNodes& coarse = *parts_->nodes;
     MatrixXd P = MatrixXd::Zero(q_.size(), d * k_all);
     for (Eigen::Index k = 0; k < k_all; ++k) {
       const Index node = loaded_[static_cast<std::size_t>(k)];
@@ -351,7 +353,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
   const double smallest = std::numeric_limits<double>::min();
   for (;; ++report.steps) {
     const VectorXd since = q_ - q_tangent_;
-    if (since.dot(parts_.K * since) > most_lag * most_lag * q_.dot(parts_.K * q_)) renew_tangent();
+    if (since.dot(parts_->K * since) > most_lag * most_lag * q_.dot(parts_->K * q_)) renew_tangent();
     H_ = hessian(contact, at, &J);
     MatrixXd A = H_;
     if (!loaded_.empty()) {
@@ -363,9 +365,11 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
               held(i, j);
       }
     }
-    const VectorXd step = positive_factor(A, parts_.K).solve(-at.gradient);
-    const double size = std::sqrt(std::max(step.dot(parts_.K * step), 0.0));
-    largest_q_ = std::max(largest_q_, std::sqrt(std::max(q_.dot(parts_.K * q_), 0.0)));
+    VectorXd step = positive_factor(A, parts_->K).solve(-at.gradient);
+    const double longest = step.cwiseAbs().maxCoeff(), most = most_of_cell * parts_->nodes->field.edge();
+    if (longest > most) step *= most / longest;
+    const double size = std::sqrt(std::max(step.dot(parts_->K * step), 0.0));
+    largest_q_ = std::max(largest_q_, std::sqrt(std::max(q_.dot(parts_->K * q_), 0.0)));
     report.residual = size / std::max(largest_q_, smallest);
     report.converged = report.residual <= tolerance;
     if (report.residual <= rounding || report.steps == most_steps) break;
@@ -376,7 +380,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
     for (int k = 0; k < most_halvings && !is_lower; ++k, share *= is_lower ? 1.0 : 0.5) {
       q = q_ + share * step;
       tried.dE = VectorXd::Zero(q.size());
-      tried.E = parts_.body->energy(q, &tried.dE);
+      tried.E = parts_->body->energy(q, &tried.dE);
       look(contact, q, tried);
       is_lower = tried.energy <= at.energy + 1e-4 * share * slope ||
                  (std::isfinite(tried.energy) && tried.gradient.norm() < 0.5 * at.gradient.norm());
@@ -407,7 +411,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
 
 /// s of all stored nodes: (Xi - P K_c^-1 P^T) R^T f.
 void TwoLevels::find_remainder(const Look& at) {
-  const CoarseNodes& coarse = *parts_.nodes;
+  const CoarseNodes& coarse = *parts_->nodes;
   std::fill(s_.begin(), s_.end(), 0.0);
   if (loaded_.empty()) return;
   const Eigen::Index d = dimension_;
@@ -442,9 +446,9 @@ TwoLevelState TwoLevels::state(std::vector<Index> near) {
   H_ -= tangent_;
   renew_tangent();
   H_ += tangent_;
-  return {.nodes = parts_.nodes,
+  return {.nodes = parts_->nodes,
           .turns = turns_,
-          .H_inverse = positive_inverse(H_, parts_.K),
+          .H_inverse = stiff_inverse(H_, parts_->K),
           .columns = columns_,
           .near = std::move(near)};
 }

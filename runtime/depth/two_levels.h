@@ -31,7 +31,7 @@ struct TwoLevelReport {
 /// given positions of the loaded nodes it is a minimisation in q; without rotation it is u = Xi f.
 class TwoLevels {
  public:
-  /// Both must outlive it.
+  /// `parts` must outlive it.
   TwoLevels(const CoarseParts& parts, std::shared_ptr<const Greens> greens);
 
   void rest() noexcept;
@@ -66,7 +66,7 @@ class TwoLevels {
   void look(const Contact& contact, const Eigen::VectorXd& q, Look& at) const;
   [[nodiscard]] Eigen::MatrixXd hessian(const Contact& contact, const Look& at, Eigen::MatrixXd* J) const;
 
-  const CoarseParts& parts_;
+  const CoarseParts* parts_;
   std::shared_ptr<const Greens> greens_;
   int dimension_;
   Eigen::VectorXd q_, q_tangent_;  // q_tangent_: where `tangent_` is that of E

@@ -32,6 +32,8 @@ class CoarseField {
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
   [[nodiscard]] Index nodes() const noexcept { return nodes_; }
+  /// Longest edge of a cell [m].
+  [[nodiscard]] double edge() const noexcept { return edge_.head(dimension_).maxCoeff(); }
   [[nodiscard]] Eigen::Index dofs() const noexcept { return Eigen::Index{dimension_} * nodes_; }
 
   /// Place of a point in the box, or beside it, where the next cell's polynomials go on.

@@ -27,7 +27,9 @@
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/core/tick/step.h"
+#include "runtime/depth/deep_model.h"
 #include "runtime/library/palpate.h"
+#include "tests/support/bodies/bent_bodies.h"
 #include "tests/support/bodies/runtime_model.h"
 #include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/folders.h"
@@ -437,9 +439,8 @@ TEST_P(MovingTick, MakesNoSystemCall) {
 #endif
 }
 
-// Beside the thread that steps a live body and renews its compliance, as the tool bends it.
-TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
-  const Body body = test::live_bar(3, {.solver = LiveLaw::corotational});
+/// Beside the thread that steps a body and renews its compliance, as a tool that comes from `above` bends it.
+void expect_no_heap_call(const Body& body, const Vec3& above, const Vec3& down) {
   State state(body, {.tools = {Tool{.radius = 0.006, .reach = 0.01}}});
   MotionSource source(body, state, {.in_background = true});
   SurfaceFrames frames(body, state, {.ticks_per_frame = 5}, [](const SurfacePicture&) {});
@@ -450,7 +451,7 @@ TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
 #endif
   for (int k = 0; k < 3000; ++k) {
     ToolPose pose;
-    pose.position = Vec3(0.07, 0.027 - 2e-5 * std::min(k, 3000 - k), 0.01);
+    pose.position = above + 2e-5 * std::min(k, 3000 - k) * down;
     while (state.surface.motion.job().step > source.steps())
       std::this_thread::sleep_for(std::chrono::microseconds(50));
 #if PALPATE_OWN_MALLOC
@@ -471,6 +472,20 @@ TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
   EXPECT_EQ(heap_calls, 0);
 #endif
   EXPECT_GT(changes, 2);
+}
+
+TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
+  const Body body = test::live_bar(3, {.solver = LiveLaw::corotational});
+  expect_no_heap_call(body, Vec3(0.07, 0.027, 0.01), -Vec3::UnitY());
+}
+
+TEST(TwoLevelTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
+  for (const int refinement : {1, 2}) {
+    const Body body(deep_model(test::bent_model(ElementType::tet4)), {}, refinement, ContactModel::two_level,
+                    refinement > 1);
+    EXPECT_EQ(body.local() != nullptr, refinement > 1);
+    expect_no_heap_call(body, Vec3(0.07, 0.005, 0.017), -0.5 * Vec3::UnitZ());
+  }
 }
 
 /// Rows and displacements of compressed Green's functions, more at once than is kept of them.
