@@ -59,7 +59,7 @@ Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
   return factor;
 }
 
-/// A^-1, or where A is not positive definite (A + share K)^-1 with a share by which no field is softer than
+/// A^-1, or where A is not positive definite (A + share K)^-1, by which no field is softer than
 /// `least_stiffness` of that at rest: a tool holds a body where it would not stay by itself.
 MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
   double share = 0.0;
