@@ -96,9 +96,10 @@ TwoLevelReport TwoLevelMotion::find() {
   if (failures_ == most_failures) levels_.rest();
   TwoLevels last = levels_;
   const TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
-  const std::vector<double>& forces = levels_.forces();
-  const bool is_finite = std::all_of(forces.begin(), forces.end(), [](double f) { return std::isfinite(f); });
-  if (is_finite && report.residual < most_residual) {
+  const auto all_finite = [](const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  };
+  if (all_finite(levels_.forces()) && all_finite(levels_.displacement()) && report.residual < most_residual) {
     failures_ = 0;
   } else {
     failures_ = failures_ < most_failures ? failures_ + 1 : 1;
@@ -176,7 +177,9 @@ void TwoLevelMotion::renew() {
   shift_ = moved(renewed_ != nullptr ? *renewed_ : at_rest);
   TwoLevelState state = levels_.state(near_nodes());
   if (const LocalCompliance* local = body_.local().get(); local != nullptr) {
-    mesh_ = two_levels(body_.shared_greens(), state);
+    TwoLevelState of_mesh = state;
+    of_mesh.near.clear();  // no tick gathers from it
+    mesh_ = two_levels(body_.shared_greens(), std::move(of_mesh));
     renewed_ = two_levels({body_.local(), &local->smooth()}, std::move(state));
   } else {
     renewed_ = mesh_ = two_levels(body_.shared_greens(), std::move(state));

@@ -5,7 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <utility>
 
 #include "base/vectors.h"
@@ -113,7 +113,7 @@ void TwoLevels::for_each_weight(Index node, const Visit& visit) const {
                              });
 }
 
-void TwoLevels::rest() noexcept {
+void TwoLevels::rest() {
   q_ = VectorXd::Zero(parts_->K.rows());
   largest_q_ = 0.0;
   H_ = tangent_ = parts_->K;
@@ -149,10 +149,7 @@ void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const doubl
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     contact.f.push_back(vector_at(f, dimension_, static_cast<Index>(k)));
     contact.u.push_back(vector_at(u, dimension_, static_cast<Index>(k)));
-    rest.push_back(contact.u.back());
-    // nodes of about one place move together: group by place in the mesh
-    const CoarsePlace& at = parts_->nodes->place[static_cast<std::size_t>(nodes[k])];
-    rest.back() = at.x;
+    rest.push_back(parts_->nodes->place[static_cast<std::size_t>(nodes[k])].x);
   }
   contact.group = grouped(rest, most_groups);
   contact.groups = nodes.empty() ? 0 : 1 + *std::max_element(contact.group.begin(), contact.group.end());

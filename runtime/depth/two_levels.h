@@ -34,7 +34,7 @@ class TwoLevels {
   /// `parts` must outlive it.
   TwoLevels(const CoarseParts& parts, std::shared_ptr<const Greens> greens);
 
-  void rest() noexcept;
+  void rest();
 
   /// Goes on to the balance under forces f [dm] on m stored nodes that are held at displacements u [dm] on
   /// average: forces are changed in groups until groups of nodes are there, one node each while they are few.

@@ -9,6 +9,7 @@
 namespace palpate {
 namespace {
 
+constexpr double least_extent = 1e-3;  // of a grid across a layer of nodes, of its longest
 constexpr double least_share =
     1e-8;  // of a node's values that others do not have; less is no field of its own
 
@@ -116,6 +117,9 @@ CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_
   Eigen::AlignedBox3d box;
   for (const Vec3& x : nodes) box.extend(x);
   const double longest = box.sizes().maxCoeff();
+  for (int axis = 0; axis < dimension; ++axis)  // one layer of free nodes has no extent across
+    if (box.sizes()[axis] < least_extent * longest)
+      box.max()[axis] = box.min()[axis] + least_extent * longest;
   std::array<Index, 3> cells = {1, 1, 1};
   CoarseField best(dimension, box.min(), box.max(), cells, nodes);
   for (double edge = longest; edge > 0.02 * longest; edge *= 0.95) {

@@ -13,7 +13,8 @@ namespace palpate {
 void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch& detection) noexcept;
 
 /// Switches the compliance for contact forces, null for the body's Green's functions, without moving the
-/// surface. Call after FreeMotion::receive, between ticks.
+/// surface. Call after FreeMotion::receive, between ticks. `shift`: MotionSample::shift, which saves finding
+/// the displacement of all nodes; empty: not known.
 void change_compliance(const ElasticBody& body, SurfaceState& surface,
                        const std::shared_ptr<const Greens>& compliance,
                        std::span<const double> shift = {}) noexcept;
