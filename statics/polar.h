@@ -1,6 +1,8 @@
 // Rotation of a deformation gradient (theory.md section 7).
 #pragma once
 
+#include <Eigen/LU>
+
 #include "meshes/mesh.h"
 
 namespace palpate {
@@ -17,6 +19,12 @@ Mat3 nearest_rotation_in_plane(const Mat3& F) noexcept;
 /// Q of F = Q A with A upper triangular: the first axis follows the first column (Parker & O'Brien 2009).
 /// Depends on the choice of axes; det Q = 1 for any F.
 Mat3 rotation_by_qr(const Mat3& F) noexcept;
+
+/// (tr U I - U)^-1 of F = R U: with it dR = R [spin]_x for the spin G axial(R^T dF).
+inline Mat3 spin_of_skew(const Mat3& R, const Mat3& F) noexcept {
+  const Mat3 U = 0.5 * (R.transpose() * F + F.transpose() * R);
+  return (U.trace() * Mat3::Identity() - U).inverse();
+}
 
 /// Axial vector of A - A^T: v . axial(A) = [v]_x : A for any v.
 inline Vec3 axial(const Mat3& A) noexcept {

@@ -1,6 +1,5 @@
 #include "runtime/depth/coarse_body.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -134,8 +133,7 @@ CoarseBody::State CoarseBody::state(const Part& part, const VectorXd& q) const {
   at.y.resize(3, at.q.cols());
   Map<VectorXd>(at.y.data(), at.y.size()).noalias() =
       part.K.selfadjointView<Eigen::Lower>() * Map<const VectorXd>(at.q.data(), at.q.size());
-  const Mat3 U = 0.5 * (at.R.transpose() * at.F + at.F.transpose() * at.R);
-  at.G = (U.trace() * Mat3::Identity() - U).inverse();
+  at.G = spin_of_skew(at.R, at.F);
   return at;
 }
 

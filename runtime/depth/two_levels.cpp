@@ -1,7 +1,6 @@
 #include "runtime/depth/two_levels.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
@@ -43,12 +42,6 @@ std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
     next = static_cast<std::size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
   }
   return group;
-}
-
-/// (tr U I - U)^-1 of F = R U: the body's spin by the skew part of R^T dF.
-Mat3 spin_of_skew(const Mat3& R, const Mat3& F) {
-  const Mat3 U = 0.5 * (R.transpose() * F + F.transpose() * R);
-  return (U.trace() * Mat3::Identity() - U).inverse();
 }
 
 /// Cholesky's factor of A, or of A with as much of K as it needs to be positive definite.
