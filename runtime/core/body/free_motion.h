@@ -91,6 +91,10 @@ class FreeMotion {
   [[nodiscard]] Vec3 at(const ElasticBody& body, Index surface_node) noexcept {
     return active_ ? find_at(body, surface_node) : Vec3(Vec3::Zero());
   }
+  /// True if `at` has found the displacement of a surface node in this tick.
+  [[nodiscard]] bool is_found(Index surface_node) const noexcept {
+    return nodes_[surface_node].stamp == ticks_;
+  }
   /// Change of that displacement since the last tick, where known [m]; valid after `at`.
   [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return nodes_[surface_node].change; }
   /// Displacement of a stored node in this tick [m].

@@ -156,7 +156,28 @@ void look_at(const ElasticBody& body, const SurfaceTree& tree, const Tool& tool,
   if (!is_chord) find_height(tree, nodes, pair);
 }
 
-/// Computes the pairs of the core's origin, and the side of the nearest simplices on which it lies.
+/// Solid angle [sr] of a triangle seen from a point (Van Oosterom and Strackee 1983), in the plane the angle
+/// of an edge [rad]: positive on its outer side.
+double angle_of_view(const SurfaceTree& tree, const SimplexNodes& nodes, const Vec3& from) noexcept {
+  const Vec3 a = tree.position(nodes[0]) - from;
+  const Vec3 b = tree.position(nodes[1]) - from;
+  if (nodes[2] < 0) return std::atan2(b.x() * a.y() - b.y() * a.x(), a.dot(b));
+  const Vec3 c = tree.position(nodes[2]) - from;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  return 2.0 * std::atan2(-a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
+/// True if most of what the core's origin sees of the surface nearby is its inner side.
+bool sees_inner_side(const ElasticBody& body, const SurfaceTree& tree, const DetectionScratch& detection,
+                     const ToolContact& touch) noexcept {
+  double outer = 0.0;
+  for (Index k = 0; k < touch.usable; ++k)
+    outer += angle_of_view(tree, nodes_of(body, detection.pairs[k].simplex), touch.core.origin);
+  return outer < 0.0;
+}
+
+/// Computes the pairs of the core's origin, and the side of the nearest simplices on which it lies. Where
+/// these face away but most others do not, they are folds, which a deep tool makes beside it.
 void look_from_origin(const ElasticBody& body, const SurfaceTree& tree, const Tool& tool,
                       DetectionScratch& detection, ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
@@ -171,7 +192,7 @@ void look_from_origin(const ElasticBody& body, const SurfaceTree& tree, const To
     find_height(tree, nodes_of(body, pair.simplex), pair);
     side += pair.height;
   }
-  touch.inside = side < 0.0;
+  touch.inside = side < 0.0 && sees_inner_side(body, tree, detection, touch);
 }
 
 /// Fraction of the surface's motion in the last tick that is expected in this one, from the motion of the

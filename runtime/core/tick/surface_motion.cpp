@@ -207,7 +207,7 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
         std::min(near_core(surface.tree, core, reach, detection.found), detection.pairs.size());
     for (std::size_t k = 0; k < found; ++k) {
       for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(detection.found[k]), d)) {
-        if (body.surface_moves(node)) follow_motion(body, surface, node);
+        if (body.surface_moves(node) && !surface.motion.is_found(node)) follow_motion(body, surface, node);
       }
     }
     surface.tree.refit();
