@@ -176,6 +176,7 @@ void TwoLevelMotion::renew() {
   const Greens& at_rest = body_.local() != nullptr ? body_.local()->smooth() : body_.greens();
   shift_ = moved(renewed_ != nullptr ? *renewed_ : at_rest);
   TwoLevelState state = levels_.state(near_nodes());
+  for (std::size_t node = 0; node < R_renewed_.size(); ++node) R_renewed_[node] = state.turns[node].R;
   if (const LocalCompliance* local = body_.local().get(); local != nullptr) {
     TwoLevelState of_mesh = state;
     of_mesh.near.clear();  // no tick gathers from it

@@ -52,17 +52,13 @@ Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
   return factor;
 }
 
-/// A^-1, or where A is not positive definite (A + share K)^-1, by which no field is softer than
-/// `least_stiffness` of that at rest: a tool holds a body where it would not stay by itself.
+/// (A + share K)^-1 with a share by which no field is softer than `least_stiffness` of that at rest: a tool
+/// holds a body where it would not stay by itself, and close to buckling.
 MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
   double share = 0.0;
-  Eigen::LLT<MatrixXd> factor(A);
-  if (factor.info() != Eigen::Success) {
-    while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
-      share = std::max(0.1, 1.5 * share);
-    factor.compute(A + share * K);
-  }
-  return factor.solve(MatrixXd::Identity(A.rows(), A.cols()));
+  while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
+    share = std::max(0.1, 1.5 * share);
+  return Eigen::LLT<MatrixXd>(A + share * K).solve(MatrixXd::Identity(A.rows(), A.cols()));
 }
 
 }  // namespace
@@ -107,6 +103,7 @@ void TwoLevels::for_each_weight(Index node, const Visit& visit) const {
 }
 
 void TwoLevels::rest() {
+  rests_ = true;
   q_ = VectorXd::Zero(parts_->K.rows());
   largest_q_ = 0.0;
   H_ = tangent_ = parts_->K;
@@ -301,6 +298,7 @@ void TwoLevels::renew_tangent() {
 
 TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const double> f,
                                std::span<const double> u, double tolerance, int most_steps) {
+  if (nodes.empty() && rests_) return {.converged = true};
   const Eigen::Index d = dimension_;
   if (!std::equal(nodes.begin(), nodes.end(), loaded_.begin(), loaded_.end())) {
     loaded_.assign(nodes.begin(), nodes.end());
@@ -380,6 +378,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
     std::swap(at, tried);
     if (report.converged) break;
   }
+  rests_ = loaded_.empty() && report.converged;
   E_ = at.E;
   dE_ = at.dE;
   forces_.clear();
@@ -451,7 +450,8 @@ CoarseParts make_coarse_parts(std::shared_ptr<const LiveBody> fine, std::span<co
   std::vector<std::uint8_t> axes(mesh.nodes.size(), 0);
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     for (std::size_t axis = 0; axis < d; ++axis)
-      if (fine->free_of_dof()[d * node + axis] >= 0) axes[node] |= 1U << axis;
+      if (fine->free_of_dof()[d * node + axis] >= 0)
+        axes[node] = static_cast<std::uint8_t>(axes[node] | 1U << axis);
     if (axes[node] != 0) free.push_back(mesh.nodes[node]);
   }
   // A field as fine as the mesh has slopes at the nodes that nodes do not decide.

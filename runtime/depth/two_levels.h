@@ -74,6 +74,7 @@ class TwoLevels {
   double largest_q_ = 0.0;  // so far, in the norm of K_c
   double E_ = 0.0;          // energy of the coarse body at q_, and its derivative
   Eigen::VectorXd dE_;
+  bool rests_ = true;  // in balance without a load
   std::vector<Index> loaded_;
   std::vector<double> forces_;
   double largest_ = 0.0;  // compliance of a loaded node at rest [m/N]

@@ -167,6 +167,7 @@ void FreeMotion::begin_tick(const ElasticBody& body) noexcept {
   if (!active_) return;
   const bool begins_step = ends_step();
   phase_ = phase_ % ticks_per_step_ + 1;
+  sampled_.last_share = sampled_.share;
   if (modal_.newmark) {
     if (begins_step) begin_modal_step(body);
     fade_held(body.modes()->first_dropped_omega());  // from the beginning of the step, as the modes
@@ -176,9 +177,22 @@ void FreeMotion::begin_tick(const ElasticBody& body) noexcept {
       modal_.shown[i] =
           modal_.q_before[i] + share * (q[i] - modal_.q_before[i]) - held_.fade * modal_.q_held[i];
   } else if (sampled_.share < 1.0) {
+    if (sampled_.most_change < 0.0) {
+      sampled_.most_change = 0.0;
+      for (std::size_t i = 0; i < sampled_.u.size(); ++i)
+        sampled_.most_change = std::max(sampled_.most_change, std::abs(sampled_.u[i] - sampled_.before[i]));
+    }
     sampled_.share = std::min(1.0, static_cast<double>(phase_ - sampled_.phase) /
                                        static_cast<double>(ticks_per_step_ - sampled_.phase));
   }
+}
+
+double FreeMotion::most_change() const noexcept {
+  if (!active_) return 0.0;
+  if (modal_.newmark || held_.fade > 0.0 || !history_.pending.force.empty())
+    return std::numeric_limits<double>::infinity();
+  return std::sqrt(static_cast<double>(dimension_)) * sampled_.most_change *
+         (sampled_.share - sampled_.last_share);
 }
 
 void FreeMotion::fade_held(double omega) noexcept {
@@ -378,11 +392,13 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
   sampled_.step = sample.step;
   sampled_.phase = phase_ % ticks_per_step_;
   sampled_.share = 0.0;
+  sampled_.most_change = -1.0;
   return true;
 }
 
 void FreeMotion::take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept {
   add(u, sign, sampled_.before);
+  sampled_.most_change = -1.0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
     const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));
     for (std::size_t k = 0; k < parts.stored.size(); ++k)

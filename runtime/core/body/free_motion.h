@@ -91,10 +91,14 @@ class FreeMotion {
   [[nodiscard]] Vec3 at(const ElasticBody& body, Index surface_node) noexcept {
     return active_ ? find_at(body, surface_node) : Vec3(Vec3::Zero());
   }
-  /// True if `at` has found the displacement of a surface node in this tick.
-  [[nodiscard]] bool is_found(Index surface_node) const noexcept {
-    return nodes_[surface_node].stamp == ticks_;
+  /// Change of that displacement since `at` was last called for the node [m]; zero the first time.
+  [[nodiscard]] Vec3 advance(const ElasticBody& body, Index surface_node) noexcept {
+    const SurfaceNode before = nodes_[surface_node];
+    const Vec3 now = find_at(body, surface_node);
+    return before.stamp < 0 ? Vec3(Vec3::Zero()) : Vec3(now - before.value);
   }
+  /// Bound of the change of any node's displacement in this tick [m]; infinite if it is not known.
+  [[nodiscard]] double most_change() const noexcept;
   /// Change of that displacement since the last tick, where known [m]; valid after `at`.
   [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return nodes_[surface_node].change; }
   /// Displacement of a stored node in this tick [m].
@@ -167,6 +171,8 @@ class FreeMotion {
     std::int64_t phase = 0;         // in which the sample came
     std::vector<double> before, u;  // [n] samples between which the tick lies
     double share = 1.0;             // of u
+    double last_share = 1.0;        // in the last tick
+    double most_change = -1.0;      // from `before` to u, of any dof; negative: not known
     std::vector<double> untouched;  // [n] empty unless live
   };
   struct SurfaceNode {

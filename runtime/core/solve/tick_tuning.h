@@ -174,6 +174,8 @@ struct FarTuning {
   Index run = 16;               ///< stored nodes per run; runs near tools are updated more often, as an
                                 ///< outdated node is touched too early or too late
   std::int64_t all_stride = 4;  ///< one tick out of this many continues with the whole body
+  double unfollowed = 0.03;     ///< [edge] motion of the body that nodes beside a tool may lag, as much as
+                                ///< the margin of the search
   double tree_margin = 0.5;     ///< [edge] margin of the tree's boxes; at 0.1 ticks take up to a fifth
                                 ///< longer, for refitting boxes
 };

@@ -156,30 +156,23 @@ void look_at(const ElasticBody& body, const SurfaceTree& tree, const Tool& tool,
   if (!is_chord) find_height(tree, nodes, pair);
 }
 
-/// Solid angle [sr] of a triangle seen from a point (Van Oosterom and Strackee 1983), in the plane the angle
-/// of an edge [rad]: positive on its outer side.
-double angle_of_view(const SurfaceTree& tree, const SimplexNodes& nodes, const Vec3& from) noexcept {
-  const Vec3 a = tree.position(nodes[0]) - from;
-  const Vec3 b = tree.position(nodes[1]) - from;
-  if (nodes[2] < 0) return std::atan2(b.x() * a.y() - b.y() * a.x(), a.dot(b));
-  const Vec3 c = tree.position(nodes[2]) - from;
-  const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  return 2.0 * std::atan2(-a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-}
-
-/// True if most of what the core's origin sees of the surface nearby is its inner side.
-bool sees_inner_side(const ElasticBody& body, const SurfaceTree& tree, const DetectionScratch& detection,
-                     const ToolContact& touch) noexcept {
-  double outer = 0.0;
-  for (Index k = 0; k < touch.usable; ++k)
-    outer += angle_of_view(tree, nodes_of(body, detection.pairs[k].simplex), touch.core.origin);
-  return outer < 0.0;
+/// True if the core's origin is on the outer side of a simplex at which the tool pressed in the last tick or
+/// pass.
+bool is_kept_out(const ElasticBody& body, const SurfaceTree& tree, const LastContacts& remembered,
+                 const ToolContact& touch) noexcept {
+  const auto begin = remembered.contacts.begin();
+  return std::any_of(begin, begin + remembered.count, [&](const ContactPoint& last) {
+    if (last.tool != touch.number || last.held || last.simplex < 0 || last.force.isZero(0.0)) return false;
+    const SimplexNodes nodes = nodes_of(body, last.simplex);
+    return outward_normal(tree, nodes).dot(touch.core.origin - tree.position(nodes[0])) >= 0.0;
+  });
 }
 
 /// Computes the pairs of the core's origin, and the side of the nearest simplices on which it lies. Where
-/// these face away but most others do not, they are folds, which a deep tool makes beside it.
+/// these face away deep below the tool, which still presses elsewhere, they are folds beside it.
 void look_from_origin(const ElasticBody& body, const SurfaceTree& tree, const Tool& tool,
-                      DetectionScratch& detection, ToolContact& touch) noexcept {
+                      const LastContacts& remembered, DetectionScratch& detection,
+                      ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
     look_at(body, tree, tool, touch, detection.found[k], detection.pairs[k]);
     touch.nearest_distance = std::min(touch.nearest_distance, detection.pairs[k].distance);
@@ -192,7 +185,8 @@ void look_from_origin(const ElasticBody& body, const SurfaceTree& tree, const To
     find_height(tree, nodes_of(body, pair.simplex), pair);
     side += pair.height;
   }
-  touch.inside = side < 0.0 && sees_inner_side(body, tree, detection, touch);
+  touch.inside =
+      side < 0.0 && (touch.nearest_distance <= touch.lost || !is_kept_out(body, tree, remembered, touch));
 }
 
 /// Fraction of the surface's motion in the last tick that is expected in this one, from the motion of the
@@ -279,7 +273,7 @@ void find_candidates(const ElasticBody& body, State& state, Scratch& scratch, In
     leave_out_simplex(body, state, scratch.detection, number, touch.core, scratch.detection.found[k]);
   keep_usable(body, state, scratch.detection, touch, count);
   if (pass == Pass::first) want_ahead(body, state.surface, scratch.detection);
-  look_from_origin(body, state.surface.tree, tool.tool, scratch.detection, touch);
+  look_from_origin(body, state.surface.tree, tool.tool, scratch.last, scratch.detection, touch);
   if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;
     tool.status |= StepStatus::inside_body;

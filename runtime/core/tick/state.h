@@ -90,8 +90,9 @@ struct SurfaceState {
   FreeMotion motion;                        ///< [n] follow_free_motion and release
   std::vector<double> stored_displacement;  ///< [n] by contact forces, as of their last update [m]
   FarSweep sweep;                           ///< renew_far_surface and renew_patch_surface
-  ComplianceChange change;                  ///< change_compliance
-  std::shared_ptr<const Patch> patch;       ///< requested overlay, null for none; used from the next tick on
+  double unfollowed = 0.0;  ///< motion since follow_free_motion last moved nodes beside the near ones [m]
+  ComplianceChange change;  ///< change_compliance
+  std::shared_ptr<const Patch> patch;  ///< requested overlay, null for none; used from the next tick on
   bool patch_is_older = false;  ///< set by the patch source: older patch in use (StepStatus::older_patch)
   double rigid_compliance;      ///< constant: added to every contact, so that coincident points divide the
                                 ///< force [m/N]

@@ -39,8 +39,7 @@ void follow_motion(const ElasticBody& body, SurfaceState& surface, Index node) n
   if (surface.near.load().local_now() == nullptr) {
     move_far(body, surface, node, stored_displacement(body, surface, node));
   } else if (surface.near.place_of(node) < 0) {
-    static_cast<void>(surface.motion.at(body, node));
-    const Vec3 position = surface.tree.position(node) + surface.motion.change(node);
+    const Vec3 position = surface.tree.position(node) + surface.motion.advance(body, node);
     if (position.allFinite()) surface.tree.move(node, position);
   }
 }
@@ -197,6 +196,9 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
   const bool is_behind = surface.motion.job().step > surface.motion.sample_step() + 1;  // by whole steps
   if (is_behind || surface.motion.is_late()) state.status |= StepStatus::late_motion;
   move_near_surface(body, surface);
+  surface.unfollowed += surface.motion.most_change();
+  if (surface.unfollowed <= tuning.far.unfollowed * body.mean_surface_edge()) return;
+  surface.unfollowed = 0.0;
   const auto d = static_cast<std::size_t>(body.dimension());
   for (const ToolState& tool : state.tools) {
     if (!tool.placed) continue;
@@ -207,7 +209,7 @@ void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch&
         std::min(near_core(surface.tree, core, reach, detection.found), detection.pairs.size());
     for (std::size_t k = 0; k < found; ++k) {
       for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(detection.found[k]), d)) {
-        if (body.surface_moves(node) && !surface.motion.is_found(node)) follow_motion(body, surface, node);
+        if (body.surface_moves(node)) follow_motion(body, surface, node);
       }
     }
     surface.tree.refit();
