@@ -13,6 +13,15 @@ namespace {
 
 using Columns = std::array<double, 3 * most_coarse_dofs>;
 
+/// q = A f for a load on few of the dofs.
+void respond_to(const Eigen::MatrixXd& A, const Eigen::Ref<const Eigen::VectorXd>& f,
+                Eigen::Ref<Eigen::VectorXd> q) noexcept {
+  q.setZero();
+  for (Eigen::Index dof = 0; dof < f.size(); ++dof) {
+    if (f[dof] != 0.0) q += f[dof] * A.col(dof);
+  }
+}
+
 class TwoLevelGreens final : public GreensOnTop {
  public:
   TwoLevelGreens(std::shared_ptr<const Greens> turned, TwoLevelState state)
@@ -70,8 +79,9 @@ class TwoLevelGreens final : public GreensOnTop {
           J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
       }
     }
-    q_rest.noalias() = state_.nodes->compliance * P_f;
-    q.noalias() = state_.H_inverse * J_f;
+    if (P_f.isZero(0.0) && J_f.isZero(0.0)) return;
+    respond_to(state_.nodes->compliance, P_f, q_rest);
+    respond_to(state_.H_inverse, J_f, q);
     Index out = 0;
     for (const NodeRange& range : ranges) {
       for (Index node = range.first; node < range.end; ++node, ++out) {
