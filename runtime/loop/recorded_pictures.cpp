@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "formats/model_file.h"
+#include "runtime/background/surface_frames.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/settings.h"
 

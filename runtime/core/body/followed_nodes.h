@@ -5,12 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "base/memory.h"
 #include "base/vectors.h"
+#include "runtime/core/body/greens.h"
 
 namespace palpate {
 
-/// Stored nodes that the surface nodes at some places follow, each once however many follow it, and the
-/// forces on them. All memory is taken at construction.
+/// Stored nodes that the surface nodes at some places follow, each once however many follow it, the forces on
+/// them, and the compliance between them. All memory is taken at construction.
 class FollowedNodes {
  public:
   /// One of the stored nodes that a place follows.
@@ -41,6 +43,13 @@ class FollowedNodes {
   /// Moves the parts of a place to one that follows none.
   void move(Index from, Index to) noexcept;
 
+  /// Green's functions between the nodes of a place's parts and all nodes(), [d x d nodes()]: those of each
+  /// part's node times its weight, added to `rows`. The nodes' own are gathered once and kept, as many
+  /// surface nodes follow the same.
+  void add_compliance(const Greens& greens, Index place, std::span<double> rows) noexcept;
+  /// Drops what is kept: the Green's functions have changed.
+  void forget_compliance() noexcept { known_ = 0; }
+
   /// Removes all forces.
   void unload() noexcept;
   /// Adds a force on the place to that of the stored node, by the part's weight [N].
@@ -51,6 +60,8 @@ class FollowedNodes {
   }
 
  private:
+  void gather(const Greens& greens) noexcept;
+  void move_compliance(Index from, Index to) noexcept;
   [[nodiscard]] std::size_t first(Index place) const noexcept {
     return static_cast<std::size_t>(most_parts_) * static_cast<std::size_t>(place);
   }
@@ -58,12 +69,16 @@ class FollowedNodes {
   int dimension_;
   Index most_parts_;
   Index count_ = 0;
-  std::vector<Index> stored_;      // [most parts x places, of the stored nodes at most]
-  std::vector<Index> uses_;        // [as these] parts that are of each
-  std::vector<Index> number_;      // [stored nodes] in stored_, -1: not followed
-  std::vector<Part> parts_;        // [most parts x places]
-  std::vector<Index> part_count_;  // [places]
-  std::vector<double> force_;      // [d x stored_]
+  std::vector<Index> stored_;       // [most parts x places, of the stored nodes at most]
+  std::vector<Index> uses_;         // [as these] parts that are of each
+  std::vector<Index> number_;       // [stored nodes] in stored_, -1: not followed
+  std::vector<Part> parts_;         // [most parts x places]
+  std::vector<Index> part_count_;   // [places]
+  std::vector<double> force_;       // [d x stored_]
+  Index kept_;                      // capacity of compliance_
+  Index known_ = 0;                 // the first of the nodes have theirs in compliance_
+  LargeVector<double> compliance_;  // [d kept x d kept] between nodes
+  std::vector<double> gathered_;    // [d x d stored_]
 };
 
 }  // namespace palpate

@@ -47,7 +47,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
   work_.blocks.resize(blocks(capacity));
   work_.by_followed.resize(blocks(followed_.room()));
   if (body.local() != nullptr) work_.local.resize(blocks(capacity));
-  work_.gathered.resize(blocks(std::max(followed_.room(), patch_nodes)));
+  work_.gathered.resize(blocks(patch_nodes));
   work_.fine_row.resize(patch_nodes > 0 ? at(dimension_ * Patch::most_nodes) : 0);
 }
 
@@ -268,6 +268,7 @@ void NearField::change_compliance(const ElasticBody& body,
                                   std::shared_ptr<const Greens> compliance) noexcept {
   ++revision_;
   load_.compliance = std::move(compliance);
+  followed_.forget_compliance();
   bool has_groups = false;
   for (Index place = 0; place < count_; ++place) has_groups = has_groups || is_group(place);
   for (Index place = count_; place-- > 0 && !has_groups;) {

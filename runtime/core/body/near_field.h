@@ -177,7 +177,7 @@ class NearField {
   struct Work {
     std::vector<double> blocks;       // [d x d capacity] its block row of C
     std::vector<double> by_followed;  // [d x d followed] its displacement by forces on stored nodes
-    std::vector<double> gathered;     // [d x d max(followed, patch room)]
+    std::vector<double> gathered;     // [d x d patch room]
     std::vector<double> fine_row;     // [d most_nodes]
     std::vector<double> local;        // [3 x 3 capacity] its local compliance before it turned
   };

@@ -156,12 +156,10 @@ const double* NearField::compliance_row(Index place, Index axis) noexcept {
 void NearField::connect_beside_patch(const ElasticBody& body, Index place) noexcept {
   const Index d = dimension_;
   const std::ptrdiff_t width = d * std::ssize(followed_.nodes());
-  std::fill_n(work_.by_followed.data(), d * width, 0.0);
-  for (const FollowedNodes::Part& part : followed_.parts(place)) {
-    load_.greens(body).gather(followed_.nodes()[at(part.number)], followed_.nodes(),
-                              {work_.gathered.data(), static_cast<std::size_t>(d * width)});
-    palpate::add(work_.gathered.data(), part.weight, work_.by_followed.data(), d * width);
-  }
+  const std::span<double> by_followed =
+      std::span(work_.by_followed).first(static_cast<std::size_t>(d * width));
+  std::fill(by_followed.begin(), by_followed.end(), 0.0);
+  followed_.add_compliance(load_.greens(body), place, by_followed);
   for (Index other = 0; other <= place; ++other) {
     double* block = work_.blocks.data() + std::ptrdiff_t{d} * other;
     const std::ptrdiff_t row = std::ptrdiff_t{d} * (place + 1);
