@@ -18,8 +18,8 @@ constexpr int most_failures = 5;        // until the search begins anew
 constexpr double most_of_cell = 0.3;    // of its edge, that a node moves in a job
 constexpr double most_behind = 0.03;    // [rad] by which W may lag
 constexpr double most_wrong = 0.1;      // error of W, as a fraction of a step's displacement of loaded nodes
-constexpr std::size_t nodes_beside = 60;  // that a tool comes to meet until the next job
-constexpr double least_wrong = 1e-6;      // fraction of their displacement below which it is negligible
+constexpr std::size_t nodes_beside = 60;   // that a tool comes to meet until the next job
+constexpr double least_wrong = tolerance;  // fraction of their displacement below which it is negligible
 
 /// Sine of half the angle between rotations: |A - B| = 2 sqrt(2) sin(angle / 2).
 double half_sine(const Mat3& A, const Mat3& B) {

@@ -52,13 +52,17 @@ Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
   return factor;
 }
 
-/// (A + share K)^-1 with a share by which no field is softer than `least_stiffness` of that at rest: a tool
-/// holds a body where it would not stay by itself, and close to buckling.
+/// A^-1, or where A is not positive definite (A + share K)^-1, by which no field is softer than
+/// `least_stiffness` of that at rest: a tool holds a body where it would not stay by itself.
 MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
   double share = 0.0;
-  while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
-    share = std::max(0.1, 1.5 * share);
-  return Eigen::LLT<MatrixXd>(A + share * K).solve(MatrixXd::Identity(A.rows(), A.cols()));
+  Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success) {
+    while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
+      share = std::max(0.1, 1.5 * share);
+    factor.compute(A + share * K);
+  }
+  return factor.solve(MatrixXd::Identity(A.rows(), A.cols()));
 }
 
 }  // namespace

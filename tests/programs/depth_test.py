@@ -3,6 +3,7 @@
 import json
 import math
 import unittest
+from pathlib import Path
 
 import numpy
 
@@ -24,6 +25,10 @@ lowest = { axis = "x", percent = 1 }
 scope = "surface"
 precision = "double"
 """
+# Time [s] and place [mm] of a hand that presses deep, slides and comes back.
+FAST = ((0, 159.6, -50, 124.4), (1.349, 159.6, 26.1, 124.4), (2.124, 135.2, 30.1, 131.9), (2.339, 152.5, 30.3, 149.8), (2.648, 152.5, 30.3, 149.8), (3.339, 152.5, -50, 149.8),
+        (3.809, 123.3, -50, 99.7), (4.498, 123.3, 25.4, 99.7), (4.708, 126.8, 20, 85.3), (4.928, 106.4, 21.7, 69.1), (5.434, 135.5, 27.6, 86.5), (5.744, 135.5, 27.6, 86.5),
+        (6.16, 135.5, -50, 86.5))
 
 
 def bend(degrees, seconds):
@@ -118,13 +123,29 @@ class Depth(ProgramTest):
             self.assertIn(words, result.stderr)
             self.assertIn("--depth", result.stderr)
 
-    def test_a_small_ball_on_a_fine_liver(self):
-        """Small strain is 9 to 16 % too stiff in this press (docs/measurements/live.md#depth)."""
+    def bake_liver(self) -> Path:
         image = MODELS / "liver" / "liver.inr.gz"
         if not image.exists():
             self.skipTest("the liver's image is not there: scripts/demo gets it")
         text = (MODELS / "liver" / "model.toml").read_text().replace("edge_length = 0.0055", "edge_length = 0.0085").replace('"layers"\nlayers = 2', '"surface"')
-        file = self.bake(text.replace('"liver.inr.gz"', f'"{image}"'))
+        return self.bake(text.replace('"liver.inr.gz"', f'"{image}"'))
+
+    def test_a_fast_hand_deep_in_a_liver(self):
+        """A ball of 20 mm is pressed in by up to 25 mm and slid, at up to 300 mm/s."""
+        file = self.bake_liver()
+        self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{y / 1000},{z / 1000}\n" for t, x, y, z in FAST))
+        result = run(RUNTIME, "play", file, "--device", "script:fast.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", "yes", "--report", "-",
+                     cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads(result.stdout)
+        self.assertGreater(report["ticks_in_contact"], 3300)
+        self.assertEqual([report["status_ticks"][status] for status in ("inside_body", "result_not_finite", "not_converged")], [0, 0, 0])
+        self.assertLess(report["largest_jump_N"], 0.25 * report["largest_force_N"])
+        self.assertLess(report["depth"]["compliance_turns"], 110)  # of 154 steps; 150 if it is made anew in each
+
+    def test_a_small_ball_on_a_fine_liver(self):
+        """Small strain is 9 to 16 % too stiff in this press (docs/measurements/live.md#depth)."""
+        file = self.bake_liver()
         reports = []
         for depth in ("yes", "no"):
             result = run(RUNTIME, "play", file, "--device", f"script:{MODELS / 'liver' / 'palpation.csv'}", "--fast", "--tool", "sphere:0.008", "--depth", depth,

@@ -32,6 +32,7 @@ struct Played {
   double largest_jump = 0;  // of the force from tick to tick [N]
   double angle = 0.0;       // of the end face [rad]
   double residual = 1.0;    // of a body on two levels at the end
+  std::int64_t turns = 0;   // of its compliance, from the middle of the wait on
 };
 
 /// Bends a body by a ball and waits.
@@ -40,6 +41,8 @@ Played play(const Body& body, double angle, int ticks, int wait) {
   std::unique_ptr<MotionSource> source;
   if (body.contact_model() != ContactModel::quasi_static)
     source = std::make_unique<MotionSource>(body, state, MotionSourceOptions{.in_background = false});
+  const auto telling = [&] { return dynamic_cast<const TwoLevelMotion&>(source->stepper()).telling(); };
+  const bool is_deep = body.contact_model() == ContactModel::two_level;
   Played played;
   for (int k = 0; k < ticks + wait; ++k) {
     if (source) source->receive(state);
@@ -48,13 +51,16 @@ Played play(const Body& body, double angle, int ticks, int wait) {
     const double now = state.tools[0].wrench.force.norm();
     played.largest_jump = std::max(played.largest_jump, std::abs(now - played.force));
     played.force = now;
+    if (is_deep && k == ticks + wait / 2) played.turns = telling().turns;
   }
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
   surface_displacement(body, state, u);
   const test::EndFace face(body.model().mesh);
   played.angle = -face.angle(test::places_of(body, u));
-  if (body.contact_model() == ContactModel::two_level)
-    played.residual = dynamic_cast<const TwoLevelMotion&>(source->stepper()).telling().last_residual;
+  if (is_deep) {
+    played.residual = telling().last_residual;
+    played.turns = telling().turns - played.turns;
+  }
   return played;
 }
 
@@ -75,6 +81,7 @@ TEST(TwoLevelTick, FeelsLikeTheCorotationalBody) {
         100 * (by_levels.force / by_live.force - 1), 100 * (by_linear.force / by_live.force - 1),
         100 * by_levels.largest_jump / by_levels.force);
     EXPECT_LT(by_levels.residual, 1e-5);
+    EXPECT_LE(by_levels.turns, 3);  // of 25 steps
     EXPECT_LT(by_levels.largest_jump, 0.005 * by_levels.force);
     EXPECT_NEAR(by_levels.force / by_live.force, 1.0, 0.05);
     EXPECT_NEAR(by_levels.angle / by_live.angle, 1.0, 0.02);
@@ -87,6 +94,52 @@ TEST(TwoLevelTick, TwoRunsAreEqual) {
   const Played one = play(body, 60.0 * degree, 300, 50), other = play(body, 60.0 * degree, 300, 50);
   EXPECT_EQ(one.force, other.force);
   EXPECT_EQ(one.largest_jump, other.largest_jump);
+}
+
+// Beside a ball that bends a tongue fast, the surface is where its displacement puts it.
+TEST(TwoLevelTick, TheSurfaceBesideATouchIsWhereTheBodyIs) {
+  const Body body(deep_model(test::bent_model(ElementType::hex8)), {}, 1, ContactModel::two_level, true);
+  ASSERT_NE(body.local(), nullptr);
+  State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
+  MotionSource source(body, state, MotionSourceOptions{.in_background = false});
+  std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
+  double farthest = 0.0;
+  Index looked_at = 0;
+  constexpr int ticks = 400;
+  for (int k = 0; k < ticks; ++k) {
+    source.receive(state);
+    const Vec3 arc = on_arc(60.0 * degree * k / ticks);
+    step(body, state,
+         {.position = Vec3(arc.x(), 0.5 * test::bent_height, arc.y() + 0.5 * test::bent_height)});
+    source.post(state);
+    if (k % 10 != 0 || state.tools[0].contacts == 0) continue;
+    surface_displacement(body, state, u);
+    for (Index node = 0; node < std::ssize(body.surface_rest_positions()); ++node) {
+      const Vec3 there = state.surface.tree.position(node);
+      const double away = (there - state.tools[0].pose.position).norm() - radius;
+      if (away > 2.0 * body.mean_surface_edge() || !body.surface_moves(node)) continue;
+      Vec3 expected =
+          body.surface_rest_positions()[node] + state.surface.near.load().local_displacement(node);
+      const SurfaceParts parts = body.surface_parts(node);
+      for (std::size_t i = 0; i < parts.stored.size(); ++i)
+        expected += parts.weights[i] * vector_at(u, 3, parts.stored[i]);
+      farthest = std::max(farthest, (there - expected).norm());
+      ++looked_at;
+    }
+  }
+  source.receive(state);
+  FreeMotion motion = state.surface.motion;
+  const auto places = body.surface_rest_positions();
+  const auto tip = static_cast<Index>(std::distance(
+      places.begin(), std::max_element(places.begin(), places.end(),
+                                       [](const Vec3& a, const Vec3& b) { return a.x() < b.x(); })));
+  static_cast<void>(motion.at(body, tip));
+  motion.begin_tick(body);
+  EXPECT_GT(motion.advance(body, tip).norm(), 0.0);
+  EXPECT_EQ(motion.advance(body, tip).norm(), 0.0);  // a node is at several triangles, and moves once
+  std::printf("%d places, off by %.2g edges at most\n", looked_at, farthest / body.mean_surface_edge());
+  EXPECT_GT(looked_at, 100);
+  EXPECT_LT(farthest, 0.1 * body.mean_surface_edge());
 }
 
 }  // namespace
