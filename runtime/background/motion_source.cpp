@@ -80,17 +80,17 @@ void MotionSource::note_standing_still(State& state) noexcept {
 
 void MotionSource::post(State& state) noexcept {
   note_standing_still(state);
-  if (!state.surface.motion.active()) return;
-  if (!in_background_) {
-    const MotionJob& job = state.surface.motion.job();
-    if (!posted_.empty() && job.step == posted_.back().step) return;
-    if (!posted_.empty() && job.step < posted_.back().step) posted_.clear();  // the state was reset
+  const MotionJob& job = state.surface.motion.job();
+  if (!state.surface.motion.active() || job.step == posted_step_) return;
+  if (in_background_) {
+    jobs_.next() = job;
+    jobs_.publish();
+  } else {
+    if (job.step < posted_step_) posted_.clear();  // the state was reset
     if (posted_.size() == most_posted) posted_.pop_front();
     posted_.push_back(job);
-    return;
   }
-  jobs_.next() = state.surface.motion.job();
-  jobs_.publish();
+  posted_step_ = job.step;
 }
 
 void MotionSource::work() noexcept {
