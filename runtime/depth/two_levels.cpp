@@ -123,18 +123,24 @@ void TwoLevels::rest() {
   turns_.assign(static_cast<std::size_t>(greens_->nodes()), {});
 }
 
-CoarseTurn TwoLevels::turn(Index node, const VectorXd& q, const Vec3& s) const {
-  CoarseTurn turn;
+TwoLevels::AtNode TwoLevels::at_node(Index node, const VectorXd& q) const {
+  AtNode at;
   const CoarseNodes& nodes = *parts_->nodes;
-  if (!nodes.turns(node)) return turn;
+  const unsigned axes = nodes.axes[static_cast<std::size_t>(node)];
   Mat3 F = Mat3::Identity();
   nodes.field.for_each_node(
-      nodes.place[static_cast<std::size_t>(node)], [&](Index k, double, const Vec3& gradient) {
-        F += vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, k) * gradient.transpose();
+      nodes.place[static_cast<std::size_t>(node)], [&](Index k, double weight, const Vec3& gradient) {
+        const Vec3 part = vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, k);
+        F += part * gradient.transpose();
+        at.moved += weight * part;
       });
-  turn.R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
-  turn.T = turn.R * cross_matrix(s) * spin_of_skew(turn.R, F);
-  return turn;
+  for (int axis = 0; axis < 3; ++axis)
+    if (((axes >> axis) & 1U) == 0) at.moved[axis] = 0.0;
+  if (nodes.turns(node)) {
+    at.R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
+    at.G = spin_of_skew(at.R, F);
+  }
+  return at;
 }
 
 void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const double> f,
@@ -185,22 +191,9 @@ void TwoLevels::look(const Contact& contact, const VectorXd& q, Look& at) const 
   const CoarseNodes& coarse = *parts_->nodes;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
-    Mat3 F = Mat3::Identity();
-    Vec3 moved = Vec3::Zero();
-    const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
-    coarse.field.for_each_node(
-        coarse.place[static_cast<std::size_t>(node)], [&](Index c, double weight, const Vec3& gradient) {
-          const Vec3 part = vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, c);
-          F += part * gradient.transpose();
-          moved += weight * part;
-        });
-    for (int axis = 0; axis < 3; ++axis)
-      if (((axes >> axis) & 1U) == 0) moved[axis] = 0.0;
-    Mat3& R = at.R[static_cast<std::size_t>(k)];
-    if (coarse.turns(node)) {
-      R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
-      at.G[static_cast<std::size_t>(k)] = spin_of_skew(R, F);
-    }
+    const auto [moved, R, G] = at_node(node, q);
+    at.R[static_cast<std::size_t>(k)] = R;
+    at.G[static_cast<std::size_t>(k)] = G;
     const Vec3& force = contact.f[static_cast<std::size_t>(k)];
     f0.segment<3>(3 * k) = force;
     phi0.segment<3>(3 * k) = R.transpose() * force;
@@ -300,40 +293,38 @@ void TwoLevels::renew_tangent() {
   q_tangent_ = q_;
 }
 
+/// Takes nodes as loaded, with the remainder's compliance between them.
+void TwoLevels::set_loaded(std::span<const Index> nodes) {
+  if (std::equal(nodes.begin(), nodes.end(), loaded_.begin(), loaded_.end())) return;
+  loaded_.assign(nodes.begin(), nodes.end());
+  const Eigen::Index d = dimension_, k_all = std::ssize(loaded_);
+  M_.setZero(3 * k_all, 3 * k_all);
+  std::vector<double> row(static_cast<std::size_t>(d * d * k_all));
+  MatrixXd P = MatrixXd::Zero(q_.size(), d * k_all);
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const Index node = loaded_[static_cast<std::size_t>(k)];
+    greens_->gather(node, loaded_, row);
+    for (Eigen::Index i = 0; i < d; ++i) {
+      for (Eigen::Index c = 0; c < d * k_all; ++c)
+        M_(3 * k + i, 3 * (c / d) + c % d) = row[static_cast<std::size_t>(i * d * k_all + c)];
+    }
+    for_each_weight(node,
+                    [&](Index dof, double weight, Eigen::Index axis) { P(dof, d * k + axis) = weight; });
+  }
+  largest_ = k_all > 0 ? M_.diagonal().maxCoeff() : 0.0;
+  const Eigen::SparseMatrix<double> sparse = P.sparseView();
+  const MatrixXd by_field = sparse.transpose() * (parts_->nodes->compliance * sparse);
+  for (Eigen::Index a = 0; a < d * k_all; ++a) {
+    for (Eigen::Index b = 0; b < d * k_all; ++b)
+      M_(3 * (a / d) + a % d, 3 * (b / d) + b % d) -= by_field(a, b);
+  }
+}
+
 TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const double> f,
                                std::span<const double> u, double tolerance, int most_steps) {
   if (nodes.empty() && rests_) return {.converged = true};
   const Eigen::Index d = dimension_;
-  if (!std::equal(nodes.begin(), nodes.end(), loaded_.begin(), loaded_.end())) {
-    loaded_.assign(nodes.begin(), nodes.end());
-    const auto k_all = std::ssize(loaded_);
-    M_.setZero(3 * k_all, 3 * k_all);
-    std::vector<double> row(static_cast<std::size_t>(d * d * k_all));
-    const CoarseNodes& coarse = *parts_->nodes;
-    MatrixXd P = MatrixXd::Zero(q_.size(), d * k_all);
-    for (Eigen::Index k = 0; k < k_all; ++k) {
-      const Index node = loaded_[static_cast<std::size_t>(k)];
-      greens_->gather(node, loaded_, row);
-      for (Eigen::Index i = 0; i < d; ++i) {
-        for (Eigen::Index c = 0; c < d * k_all; ++c)
-          M_(3 * k + i, 3 * (c / d) + c % d) = row[static_cast<std::size_t>(i * d * k_all + c)];
-      }
-      const unsigned axes = coarse.axes[static_cast<std::size_t>(node)];
-      coarse.field.for_each_node(coarse.place[static_cast<std::size_t>(node)],
-                                 [&](Index c, double weight, const Vec3&) {
-                                   for (Eigen::Index axis = 0; axis < d; ++axis)
-                                     if (((axes >> axis) & 1U) != 0) P(d * c + axis, d * k + axis) = weight;
-                                 });
-    }
-    largest_ = k_all > 0 ? M_.diagonal().maxCoeff() : 0.0;
-    const Eigen::SparseMatrix<double> sparse = P.sparseView();
-    const MatrixXd KP = coarse.compliance * sparse;
-    const MatrixXd by_field = sparse.transpose() * KP;
-    for (Eigen::Index a = 0; a < d * k_all; ++a) {
-      for (Eigen::Index b = 0; b < d * k_all; ++b)
-        M_(3 * (a / d) + a % d, 3 * (b / d) + b % d) -= by_field(a, b);
-    }
-  }
+  set_loaded(nodes);
   Contact contact;
   make_contact(nodes, f, u, contact);
   TwoLevelReport report;
@@ -427,11 +418,9 @@ void TwoLevels::find_remainder(const Look& at) {
 void TwoLevels::find_displacement() {
   for (Index node = 0; node < greens_->nodes(); ++node) {
     const Vec3 s = vector_at(s_, dimension_, node);
-    const CoarseTurn& turned = turns_[static_cast<std::size_t>(node)] = turn(node, q_, s);
-    Vec3 moved = Vec3::Zero();
-    for_each_weight(node,
-                    [&](Index dof, double weight, Eigen::Index axis) { moved[axis] += weight * q_[dof]; });
-    set_vector(u_, dimension_, node, moved + turned.R * s);
+    const auto [moved, R, G] = at_node(node, q_);
+    turns_[static_cast<std::size_t>(node)] = {.R = R, .T = R * cross_matrix(s) * G};
+    set_vector(u_, dimension_, node, moved + R * s);
   }
 }
 

@@ -55,7 +55,14 @@ class TwoLevels {
   struct Contact;
   struct Look;
 
-  [[nodiscard]] CoarseTurn turn(Index node, const Eigen::VectorXd& q, const Vec3& s) const;
+  /// The coarse field at a stored node: displacement, rotation, and spin by the skew part (spin_of_skew).
+  struct AtNode {
+    Vec3 moved = Vec3::Zero();
+    Mat3 R = Mat3::Identity(), G = Mat3::Zero();
+  };
+
+  [[nodiscard]] AtNode at_node(Index node, const Eigen::VectorXd& q) const;
+  void set_loaded(std::span<const Index> nodes);
   void renew_tangent();
   template <class Visit>
   void for_each_weight(Index node, const Visit& visit) const;
