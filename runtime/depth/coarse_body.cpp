@@ -190,7 +190,7 @@ MatrixXd CoarseBody::tangent(const VectorXd& q) const {
       const Vec3 g = part.G.col(a);
       const Eigen::Matrix<double, 3, 9> T =
           g.x() * C.topRows<3>() + g.y() * C.middleRows<3>(3) + g.z() * C.bottomRows<3>();
-      for (Eigen::Index b = 0; b < terms; ++b) {
+      for (Eigen::Index b = 0; b <= a; ++b) {
         const Vec3 h = part.G.col(b);
         const Mat3 block = at.R * local.block<3, 3>(3 * a, 3 * b) * at.R.transpose() +
                            h.x() * T.leftCols<3>() + h.y() * T.middleCols<3>(3) + h.z() * T.rightCols<3>();
@@ -198,8 +198,10 @@ MatrixXd CoarseBody::tangent(const VectorXd& q) const {
           for (std::size_t j = 0; j < 3; ++j) {
             const Index row = part.dofs[3 * static_cast<std::size_t>(a) + i],
                         column = part.dofs[3 * static_cast<std::size_t>(b) + j];
-            if (row >= 0 && column >= 0)
-              K(row, column) += block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+            if (row < 0 || column < 0) continue;
+            const double value = block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+            K(row, column) += value;
+            if (a != b) K(column, row) += value;
           }
         }
       }

@@ -26,8 +26,8 @@ scope = "surface"
 precision = "double"
 """
 # Time [s] and place [mm] of a hand that presses deep, slides and comes back.
-FAST = ((0, 159.6, -50, 124.4), (1.349, 159.6, 26.1, 124.4), (2.124, 135.2, 30.1, 131.9), (2.339, 152.5, 30.3, 149.8), (2.648, 152.5, 30.3, 149.8), (3.339, 152.5, -50, 149.8),
-        (3.809, 123.3, -50, 99.7), (4.498, 123.3, 25.4, 99.7), (4.708, 126.8, 20, 85.3), (4.928, 106.4, 21.7, 69.1), (5.434, 135.5, 27.6, 86.5), (5.744, 135.5, 27.6, 86.5),
+FAST = ((0, 159.6, -50, 124.4), (1.349, 159.6, 18.1, 124.4), (2.124, 135.2, 22.1, 131.9), (2.339, 152.5, 22.3, 149.8), (2.648, 152.5, 22.3, 149.8), (3.339, 152.5, -50, 149.8),
+        (3.809, 123.3, -50, 99.7), (4.498, 123.3, 17.4, 99.7), (4.708, 126.8, 12, 85.3), (4.928, 106.4, 13.7, 69.1), (5.434, 135.5, 19.6, 86.5), (5.744, 135.5, 19.6, 86.5),
         (6.16, 135.5, -50, 86.5))
 
 
@@ -131,16 +131,16 @@ class Depth(ProgramTest):
         return self.bake(text.replace('"liver.inr.gz"', f'"{image}"'))
 
     def test_a_fast_hand_deep_in_a_liver(self):
-        """A ball of 20 mm is pressed in by up to 25 mm and slid, at up to 300 mm/s."""
+        """A ball of 20 mm is pressed in by some 18 mm and slid, at up to 300 mm/s."""
         file = self.bake_liver()
         self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{y / 1000},{z / 1000}\n" for t, x, y, z in FAST))
         result = run(RUNTIME, "play", file, "--device", "script:fast.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", "yes", "--report", "-",
                      cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         report = json.loads(result.stdout)
-        self.assertGreater(report["ticks_in_contact"], 3300)
+        self.assertGreater(report["ticks_in_contact"], 3000)
         self.assertEqual([report["status_ticks"][status] for status in ("inside_body", "result_not_finite", "not_converged")], [0, 0, 0])
-        self.assertLess(report["largest_jump_N"], 0.25 * report["largest_force_N"])
+        self.assertLess(report["largest_jump_N"], 0.03 * report["largest_force_N"])
         self.assertLess(report["depth"]["compliance_turns"], 110)  # of 154 steps; 150 if it is made anew in each
 
     def test_a_small_ball_on_a_fine_liver(self):

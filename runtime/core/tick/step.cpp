@@ -62,11 +62,12 @@ void note_unsettled_tools(State& state) noexcept {
   }
 }
 
-/// Computes the mean free motion of the surface touched by a tool, weighted by force.
+/// Computes the mean free motion of the surface touched by a tool, weighted by force. That of a body on two
+/// levels only corrects what the tick foresaw: no motion of the body explains its forces.
 void note_surface_change(const ElasticBody& body, const State& state, ToolState& tool,
                          Index number) noexcept {
   tool.surface_change.setZero();
-  if (!state.surface.motion.active()) return;
+  if (!state.surface.motion.active() || body.contact_model() == ContactModel::two_level) return;
   double sum = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
     const double force = contact.tool == number ? contact.force.norm() : 0.0;
