@@ -141,7 +141,6 @@ class Depth(ProgramTest):
         self.assertGreater(report["ticks_in_contact"], 3000)
         self.assertEqual([report["status_ticks"][status] for status in ("inside_body", "result_not_finite", "not_converged")], [0, 0, 0])
         self.assertLess(report["largest_jump_N"], 0.03 * report["largest_force_N"])
-        self.assertLess(report["depth"]["compliance_turns"], 110)  # of 154 steps; 150 if it is made anew in each
 
     def test_a_small_ball_on_a_fine_liver(self):
         """Small strain is 9 to 16 % too stiff in this press (docs/measurements/live.md#depth)."""
