@@ -11,7 +11,7 @@ constexpr Index most_kept = 512;  // nodes whose compliance is kept: 19 MB
 
 }  // namespace
 
-FollowedNodes::FollowedNodes(int dimension, Index places, Index most_parts, Index stored_nodes)
+FollowedNodes::FollowedNodes(int dimension, Index places, Index most_parts, Index stored_nodes, bool shared)
     : dimension_(dimension),
       most_parts_(most_parts),
       stored_(static_cast<std::size_t>(std::min(most_parts * places, stored_nodes))),
@@ -20,7 +20,7 @@ FollowedNodes::FollowedNodes(int dimension, Index places, Index most_parts, Inde
       parts_(static_cast<std::size_t>(most_parts * places)),
       part_count_(static_cast<std::size_t>(places)),
       force_(static_cast<std::size_t>(dimension) * stored_.size()),
-      kept_(most_parts > 1 ? std::min(most_kept, room()) : 0),
+      kept_(shared ? std::min(most_kept, room()) : 0),
       compliance_(static_cast<std::size_t>(dimension * kept_) * static_cast<std::size_t>(dimension * kept_)),
       gathered_(static_cast<std::size_t>(dimension) * force_.size()) {}
 

@@ -21,8 +21,9 @@ class FollowedNodes {
     double weight = 0.0;  ///< SurfaceParts::weights
   };
 
-  /// Capacity for `places` with up to `most_parts` parts each, of a body with so many stored nodes.
-  FollowedNodes(int dimension, Index places, Index most_parts, Index stored_nodes);
+  /// Capacity for `places` with up to `most_parts` parts each, of a body with so many stored nodes. `shared`:
+  /// several places follow the same nodes, whose compliance is kept.
+  FollowedNodes(int dimension, Index places, Index most_parts, Index stored_nodes, bool shared);
 
   /// The stored nodes that are followed, in no order.
   [[nodiscard]] std::span<const Index> nodes() const noexcept {

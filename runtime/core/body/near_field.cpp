@@ -31,7 +31,7 @@ NearField::NearField(const ElasticBody& body, Index capacity, Index patch_nodes)
       last_motion_(force_.size()),
       offset_(force_.size()),
       followed_(dimension_, capacity, std::max(body.most_surface_parts(), most_members_),
-                body.greens().nodes()),
+                body.greens().nodes(), body.most_surface_parts() > 1),
       members_{std::vector<Index>(at(capacity)), std::vector<Index>(at(most_members_ * capacity)),
                std::vector<double>(at(most_members_ * capacity)),
                std::vector<Eigen::Matrix3d>(at(most_members_ * capacity))},

@@ -16,7 +16,7 @@ TEST(FollowedNodes, KeepTheComplianceOfThoseThatAreHere) {
     constexpr Index stored = 40, places = 24, parts = 3;
     const Eigen::MatrixXd first = test::random_definite(d * stored, 3);
     std::shared_ptr<const Greens> greens = make_greens(test::pack(first, Precision::double_precision), d, {});
-    FollowedNodes followed(d, places, parts, stored);
+    FollowedNodes followed(d, places, parts, stored, true);
     std::mt19937 random(7);
     const auto below = [&](Index n) { return static_cast<Index>(random() % static_cast<unsigned>(n)); };
     std::vector<std::vector<std::pair<Index, double>>> of_place;
