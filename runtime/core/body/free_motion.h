@@ -91,7 +91,8 @@ class FreeMotion {
   [[nodiscard]] Vec3 at(const ElasticBody& body, Index surface_node) noexcept {
     return active_ ? find_at(body, surface_node) : Vec3(Vec3::Zero());
   }
-  /// Change of that displacement since `at` was last called for the node [m]; zero the first time.
+  /// Change of a surface node's displacement since `at` or this was last called for it [m]; zero the first
+  /// time.
   [[nodiscard]] Vec3 advance(const ElasticBody& body, Index surface_node) noexcept {
     const SurfaceNode before = nodes_[surface_node];
     const Vec3 now = find_at(body, surface_node);
@@ -99,7 +100,7 @@ class FreeMotion {
   }
   /// Bound of the change of any node's displacement in this tick [m]; infinite if it is not known.
   [[nodiscard]] double most_change() const noexcept;
-  /// Change of that displacement since the last tick, where known [m]; valid after `at`.
+  /// Change of a surface node's displacement since the last tick, where known [m]; valid after `at`.
   [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return nodes_[surface_node].change; }
   /// Displacement of a stored node in this tick [m].
   [[nodiscard]] Vec3 displacement(const ElasticBody& body, Index stored) const noexcept;
