@@ -93,6 +93,7 @@ struct ContactLoads {
   std::vector<Index> node{};   ///< [n] loaded surface nodes, each once, ascending
   std::vector<float> force{};  ///< [n x 3] on the body [N]
   std::vector<float> press{};  ///< [n] normal force of the contact points [N]
+  std::vector<float> field{};  ///< [n_q] coarse field of a body on two levels [m]; empty for others
 };
 
 /// Time of a picture of the surface.

@@ -83,7 +83,7 @@ SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::st
   if (said == layout.metadata.end() || value("format") != "palpate-recording")
     throw Error("is an MCAP file, but not a recording of Palpate's", path, give_another);
   const std::string version = value("version");
-  if (version.substr(0, version.find('.')) != "5")
+  if (version.substr(0, version.find('.')) != "6")
     throw Error("is a recording of another version", path, record_again);
   generator = value("generator");
   SessionInfo info{.model_path = value("model"),
@@ -162,6 +162,7 @@ void check_loads(const ContactLoads& loads, std::size_t nodes, std::size_t row,
   }
   for (const float f : loads.force) check.expect(std::isfinite(f), topic, row, "force", f, "a finite number");
   for (const float f : loads.press) check.expect(std::isfinite(f), topic, row, "press", f, "a finite number");
+  for (const float q : loads.field) check.expect(std::isfinite(q), topic, row, "field", q, "a finite number");
 }
 
 }  // namespace

@@ -58,7 +58,8 @@ constexpr const char* contacts_definition =
     "float64 time      # since the start of the run [s]\n"
     "int32[] node      # loaded nodes of the surface\n"
     "float32[] force   # x, y, z of each: on the body [N]\n"
-    "float32[] press   # what contact points press with along their normals [N]\n";
+    "float32[] press   # what contact points press with along their normals [N]\n"
+    "float32[] field   # coarse field of a body that bends far [m]; none: empty\n";
 constexpr const char* picture_definition =
     "# The surface at one moment.\n"
     "int64 tick\n"
@@ -170,7 +171,7 @@ std::string to_message(const TickRecord& tick) {
 }
 
 std::string to_message(const ContactLoads& loads) {
-  return message_of(loads.tick, loads.time, loads.node, loads.force, loads.press);
+  return message_of(loads.tick, loads.time, loads.node, loads.force, loads.press, loads.field);
 }
 
 std::string to_message(const SurfaceFrame& frame) {
@@ -220,7 +221,7 @@ bool from_message(std::string_view message, TickRecord& tick) {
 }
 
 bool from_message(std::string_view message, ContactLoads& loads) {
-  return is_read(message, loads.tick, loads.time, loads.node, loads.force, loads.press);
+  return is_read(message, loads.tick, loads.time, loads.node, loads.force, loads.press, loads.field);
 }
 
 bool from_message(std::string_view message, SurfaceFrame& frame) {

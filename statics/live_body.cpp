@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -62,8 +63,13 @@ LiveInput live_input(const Model& model) {
           .load = loads_alone(model)};
 }
 
+struct LiveBody::LatePattern {
+  std::once_flag is_made;
+  TangentPattern pattern;
+};
+
 LiveBody::LiveBody(LiveInput input, const LiveOptions& options)
-    : input_(std::move(input)), options_(options) {
+    : input_(std::move(input)), options_(options), pattern_(std::make_shared<LatePattern>()) {
   check();
   number_dofs();
   for (const Material& material : input_.materials) {
@@ -73,8 +79,14 @@ LiveBody::LiveBody(LiveInput input, const LiveOptions& options)
   }
   find_points();
   find_loads();
-  pattern_ =
-      TangentPattern(input_.mesh.connectivity, nodes_per_element_, dimension(), free_of_dof_, free_dofs());
+}
+
+const TangentPattern& LiveBody::pattern() const {
+  std::call_once(pattern_->is_made, [&] {
+    pattern_->pattern =
+        TangentPattern(input_.mesh.connectivity, nodes_per_element_, dimension(), free_of_dof_, free_dofs());
+  });
+  return pattern_->pattern;
 }
 
 void LiveBody::check() const {

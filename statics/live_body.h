@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -90,7 +91,8 @@ class LiveBody {
   [[nodiscard]] const Mat3& initial_strain(Index element) const noexcept {
     return initial_strain_[input_.material_of_element[element]];
   }
-  [[nodiscard]] const TangentPattern& pattern() const noexcept { return pattern_; }
+  /// Is made when first asked for.
+  [[nodiscard]] const TangentPattern& pattern() const;
 
  private:
   void check() const;
@@ -107,7 +109,8 @@ class LiveBody {
   std::vector<double> weight_, gradient_;
   std::vector<LawConstants> constants_;  // [materials]
   std::vector<Mat3> initial_strain_;     // [materials]
-  TangentPattern pattern_;
+  struct LatePattern;
+  std::shared_ptr<LatePattern> pattern_;
 };
 
 }  // namespace palpate

@@ -89,7 +89,8 @@ ForceSums internal_forces(const LiveBody& body, const Eigen::VectorXd& x, std::s
 
 void assemble_tangent(const LiveBody& body, const Eigen::VectorXd& x, std::span<const Mat3> plastic,
                       TangentKind kind, LiveMatrix& K) {
-  if (K.nonZeros() != body.pattern().zero().nonZeros()) K = body.pattern().zero();
+  const TangentPattern& pattern = body.pattern();
+  if (K.nonZeros() != pattern.zero().nonZeros()) K = pattern.zero();
   std::fill_n(K.valuePtr(), K.nonZeros(), 0.0);
   const Eigen::Index d = body.dimension();
   for (Index e = 0; e < body.mesh().elements(); ++e) {
@@ -101,7 +102,7 @@ void assemble_tangent(const LiveBody& body, const Eigen::VectorXd& x, std::span<
                      relaxed_strain(body, plastic, e, point), kind);
       add_point(C, body.gradients(point), body.weight(point), d, K_e);
     }
-    add_entries(body.pattern().places(e), K_e, K.valuePtr());
+    add_entries(pattern.places(e), K_e, K.valuePtr());
   }
 }
 

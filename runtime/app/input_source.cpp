@@ -40,7 +40,7 @@ Settings settle_hand(Settings settings, const DeviceLimits& limits, const Body& 
   if (!settings.safety) {
     settings.safety.emplace();
     // Free vibration returns energy that would look like activity.
-    if (body.model().dynamics.method != DynamicsMethod::none) settings.safety->max_damping = 0.0;
+    if (body.swings() && body.coarse() == nullptr) settings.safety->max_damping = 0.0;
   }
   *settings.safety = limited(*settings.safety, limits);
   settings.tool.coupling_stiffness =

@@ -228,7 +228,7 @@ void print_report(const PlayedRun& run) {
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     say(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
-        1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
+        1e3 * run.body.swing().newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (const LiveMotion* live = run.live()) print_live(run.body, live->telling(), run.report);
   if (const TwoLevelMotion* deep = run.deep()) print_depth(deep->telling());

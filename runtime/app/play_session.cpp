@@ -74,7 +74,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
                                          .memory = settings.overlay_memory,
                                          .in_background = in_background});
   }
-  if (body.model().dynamics.method == DynamicsMethod::packed)
+  if (body.swing().method == DynamicsMethod::packed)
     motion_.emplace(body, state_, MotionSourceOptions{.in_background = in_background});
   if (body.live() != nullptr && in_background) warn_of_slow_steps(body);
   if (!options_.record.empty()) {

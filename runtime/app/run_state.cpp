@@ -6,6 +6,7 @@
 #include "meshes/element_type.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"
+#include "runtime/depth/deep_body.h"
 #include "runtime/depth/studied_range.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/viewer/run_words.h"
@@ -91,6 +92,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
           {"moves",
            model.dynamics.method != DynamicsMethod::none && body.contact_model() != ContactModel::two_level},
+          {"deep", body.contact_model() == ContactModel::two_level},
+          {"goes_deep", goes_deep(model)},
           {"loads", has_loads(model)},
           {"materials", youngs_moduli(model)},
           {"studied_rotation", number_or_null(studied_rotation(body))},

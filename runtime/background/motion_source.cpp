@@ -33,7 +33,7 @@ MotionSource::MotionSource(const Body& body, const State& state, const MotionSou
       stepper_(make_stepper(body, options.jobs > 0 ? options.jobs : processors_beside_the_tick())),
       in_background_(options.in_background),
       jobs_(state.surface.motion.job()),
-      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}),
+      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.motion_size()))}),
       timely_(state.tools.size(), Vec3::Zero()) {
   if (in_background_) worker_ = std::thread([this] { work(); });
 }
@@ -97,7 +97,10 @@ void MotionSource::work() noexcept {
   int pauses = 0;
   while (!stop_) {
     const MotionJob& job = jobs_.read();
-    if (job.step != done_) {
+    // A sample that the tick passes over would be missing in a replay: the next one waits for the job after
+    // it.
+    const bool is_unseen = job.step > done_ && job.seen != done_;
+    if (job.step != done_ && !is_unseen) {
       do_job(job);
       pauses = 0;
     } else if (pauses < patience) {

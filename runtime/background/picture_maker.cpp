@@ -9,6 +9,8 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/vectors.h"
+#include "runtime/depth/coarse_parts.h"
 
 namespace palpate {
 
@@ -23,9 +25,9 @@ void sort_out(std::vector<Index>& numbers) {
 }  // namespace
 
 bool pictures_follow_from_contacts(const Body& body) noexcept {
-  return body.live() == nullptr && body.contact_model() == ContactModel::quasi_static &&
-         body.model().dynamics.method == DynamicsMethod::none &&
-         (body.refinement() == 1 || body.local() != nullptr);
+  const bool is_static = body.coarse() != nullptr || (body.contact_model() == ContactModel::quasi_static &&
+                                                      body.model().dynamics.method == DynamicsMethod::none);
+  return body.live() == nullptr && is_static && (body.refinement() == 1 || body.local() != nullptr);
 }
 
 ContactLoads contact_loads(std::span<const NodalForce> forces, std::span<const NodalPress> presses) {
@@ -128,6 +130,26 @@ void PictureMaker::show_pressure(std::span<const NodalPress> presses, SurfaceFra
   }
 }
 
+void PictureMaker::follow_field(const std::vector<float>& field, SurfaceLoad& load,
+                                MotionSnapshot& motion) const {
+  const auto dofs = static_cast<std::size_t>(body_.coarse()->dofs());
+  if (field.size() != dofs)
+    throw Error("field has " + std::to_string(field.size()) + " numbers, and the body's coarse field " +
+                    std::to_string(dofs),
+                "/contacts", "give the model that was recorded");
+  const std::vector<double> q(field.begin(), field.end());
+  TwoLevelState state = at_rest(body_.coarse());
+  state.H_inverse.setZero();  // q has what the forces move it by
+  for (Index node = 0; node < body_.greens().nodes(); ++node) {
+    const CoarseAt at = coarse_at(*body_.coarse(), node, q);
+    state.turns[static_cast<std::size_t>(node)].R = at.R;
+    set_vector(motion.u, body_.dimension(), node, at.moved);
+  }
+  motion.moves = true;
+  load.compliance = load.local != nullptr ? two_levels({load.local, &load.local->smooth()}, std::move(state))
+                                          : two_levels(body_.shared_greens(), std::move(state));
+}
+
 SurfaceFrame PictureMaker::picture(const ContactLoads& loads) {
   const auto count = static_cast<Index>(loads.node.size());
   SurfaceLoad load(body_, count, body_.most_surface_parts() * count, 0);
@@ -149,7 +171,9 @@ SurfaceFrame PictureMaker::picture(const ContactLoads& loads) {
     }
   }
   SurfaceFrame frame{.tick = loads.tick, .time = loads.time};
-  show(load, nullptr, forces, presses, frame);
+  MotionSnapshot motion(body_);
+  if (body_.coarse() != nullptr) follow_field(loads.field, load, motion);
+  show(load, &motion, forces, presses, frame);
   keep_recorded(body_, frame);
   return frame;
 }

@@ -12,8 +12,8 @@
 
 namespace palpate {
 
-/// True if a picture follows from the contact forces alone: the body is displaced by its Green's functions,
-/// without dynamics, depth or the patches of an overlay.
+/// True if a picture follows from the contact forces alone, and on two levels from those and the coarse
+/// field: the body is displaced by its Green's functions, without dynamics or the patches of an overlay.
 [[nodiscard]] bool pictures_follow_from_contacts(const Body& body) noexcept;
 
 /// Leaves what a recording has of a picture: the surface of the body's own mesh where tools meet a finer one
@@ -58,6 +58,8 @@ class PictureMaker {
   [[nodiscard]] SurfaceFrame picture(const ContactLoads& loads);
 
  private:
+  /// Has the body move by its coarse field [n_q], and the load's compliance turn with it.
+  void follow_field(const std::vector<float>& field, SurfaceLoad& load, MotionSnapshot& motion) const;
   void show_stress(std::span<const NodalForce> forces, const Patch* patch, SurfaceFrame& frame);
   void show_pressure(std::span<const NodalPress> presses, SurfaceFrame& frame) const;
 

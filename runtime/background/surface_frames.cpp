@@ -7,6 +7,7 @@
 #include "base/vectors.h"
 #include "runtime/background/element_stress.h"
 #include "runtime/core/body/surface_load.h"
+#include "runtime/core/body/two_level_greens.h"
 #include "runtime/core/touch/contact_nodes.h"
 
 namespace palpate {
@@ -52,7 +53,10 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
           .presses = std::vector<NodalPress>(3 * state.contact_points.size() +
                                              static_cast<std::size_t>(state.surface.near.capacity())),
           .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}) {
-  if (!options_.contacts_only) maker_.emplace(body);
+  if (!options_.contacts_only)
+    maker_.emplace(body);
+  else if (body.coarse() != nullptr)
+    field_at_rest_ = two_levels(body.shared_greens(), at_rest(body.coarse()));
   if (maker_ && knows_interior(body)) {
     const std::size_t nodes = body.model().mesh.nodes.size();
     interior_ = {element_stress(body.model()), std::vector<Vec3>(nodes), std::vector<Stress>(nodes),
@@ -140,6 +144,7 @@ void SurfaceFrames::compute(const Moment& moment) {
     picture.loads = contact_loads(forces, presses);
     picture.loads.tick = moment.tick;
     picture.loads.time = moment.time;
+    if (field_at_rest_ != nullptr) picture.loads.field = coarse_field(moment);
     return sink_(std::move(picture));
   }
   static_cast<SeenTool&>(picture) = moment.seen;
@@ -150,6 +155,18 @@ void SurfaceFrames::compute(const Moment& moment) {
   for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k]);
   if (interior_) show_interior(picture);
   sink_(std::move(picture));
+}
+
+/// The motion's, and what the forces of the tick add to it.
+std::vector<float> SurfaceFrames::coarse_field(const Moment& moment) const {
+  const auto n = static_cast<std::size_t>(body_.greens().order());
+  std::vector<double> q(moment.motion.u.size() - n);
+  const Greens& W = moment.load.compliance != nullptr ? *moment.load.compliance : *field_at_rest_;
+  W.coarse_displacement(moment.load.nodes(), moment.load.forces(), q);
+  std::vector<float> field;
+  for (std::size_t k = 0; k < q.size(); ++k)
+    field.push_back(static_cast<float>(q[k] + moment.motion.u[n + k]));
+  return field;
 }
 
 void SurfaceFrames::show_interior(SurfacePicture& picture) {

@@ -89,15 +89,17 @@ class SurfaceFrames {
   void take_contacts(const State& state, Moment& moment) const noexcept;
   void work();
   void compute(const Moment& moment);
+  [[nodiscard]] std::vector<float> coarse_field(const Moment& moment) const;
   void show_interior(SurfacePicture& picture);
 
   const Body& body_;
   SurfaceFramesOptions options_;
   Sink sink_;
   Latest<Moment> moments_;
-  std::optional<PictureMaker> maker_;  // empty for contacts alone
-  std::optional<Interior> interior_;   // in the plane, if all of it is known
-  std::int64_t computed_ = -1;         // tick of the last frame
+  std::optional<PictureMaker> maker_;            // empty for contacts alone
+  std::shared_ptr<const Greens> field_at_rest_;  // on two levels, for contacts alone; else null
+  std::optional<Interior> interior_;             // in the plane, if all of it is known
+  std::int64_t computed_ = -1;                   // tick of the last frame
   std::atomic<bool> stop_ = false;
   std::thread worker_;
 };

@@ -26,25 +26,15 @@ double half_sine(const Mat3& A, const Mat3& B) {
   return (A - B).norm() / std::sqrt(8.0);
 }
 
-CoarseParts coarse_parts(const Body& body) {
-  const std::vector<Material>& materials = body.model().materials;
-  const bool is_strained = std::any_of(materials.begin(), materials.end(), [](const Material& material) {
-    const auto& strain = material.initial_strain;
-    return std::any_of(strain.begin(), strain.end(), [](double s) { return s != 0.0; });
-  });
-  const LiveOptions options{.law = is_strained ? LiveLaw::corotational : LiveLaw::neo_hookean};
-  return make_coarse_parts(std::make_shared<const LiveBody>(live_input(body.model()), options),
-                           body.model().stored_nodes, most_coarse_dofs);
-}
-
 }  // namespace
 
 TwoLevelMotion::TwoLevelMotion(const Body& body)
     : body_(body),
-      parts_(coarse_parts(body)),
+      parts_(*body.coarse_parts()),
+      field_at_rest_(two_levels(body.shared_greens(), at_rest(body.coarse()))),
       levels_(parts_, body.shared_greens()),
       R_renewed_(static_cast<std::size_t>(body.greens().nodes()), Mat3::Identity()),
-      by_load_(static_cast<std::size_t>(body.greens().order())),
+      by_load_(static_cast<std::size_t>(body.motion_size())),
       x_(by_load_.size()),
       x_before_(by_load_.size()),
       without_(by_load_.size()) {}
@@ -113,12 +103,12 @@ void TwoLevelMotion::do_job(const MotionJob& job, bool, std::span<double> u) noe
   try {
     take_load(job.load);
     const TwoLevelReport report = find();
-    std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
+    const auto of_field = std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
+    std::copy(levels_.field().begin(), levels_.field().end(), of_field);
     shift_.clear();
     if (must_renew()) renew();
     tell(report);
-    std::fill(by_load_.begin(), by_load_.end(), 0.0);
-    if (!nodes_.empty()) now().displacement(levels_.loaded(), levels_.forces(), by_load_);
+    find_by_load(now(), by_load_);
   } catch (const std::exception&) {  // out of memory: the body stays as it was
     std::copy(without_.begin(), without_.end(), u.begin());
     return;
@@ -167,14 +157,19 @@ std::vector<Index> TwoLevelMotion::near_nodes() const {
   return near;
 }
 
+void TwoLevelMotion::find_by_load(const Greens& W, std::vector<double>& u) const {
+  u.assign(x_.size(), 0.0);
+  if (nodes_.empty()) return;
+  const std::span all(u);
+  const auto n = static_cast<std::size_t>(W.order());
+  W.displacement(levels_.loaded(), levels_.forces(), all.first(n));
+  const Greens& with_field = renewed_ != nullptr ? W : *field_at_rest_;
+  with_field.coarse_displacement(levels_.loaded(), levels_.forces(), all.subspan(n));
+}
+
 void TwoLevelMotion::renew() {
-  const auto moved = [&](const Greens& tick) {
-    std::vector<double> u(by_load_.size(), 0.0);
-    if (!nodes_.empty()) tick.displacement(levels_.loaded(), levels_.forces(), u);
-    return u;
-  };
   const Greens& at_rest = body_.local() != nullptr ? body_.local()->smooth() : body_.greens();
-  shift_ = moved(renewed_ != nullptr ? *renewed_ : at_rest);
+  find_by_load(renewed_ != nullptr ? *renewed_ : at_rest, shift_);
   TwoLevelState state = levels_.state(near_nodes());
   for (std::size_t node = 0; node < R_renewed_.size(); ++node) R_renewed_[node] = state.turns[node].R;
   if (const LocalCompliance* local = body_.local().get(); local != nullptr) {
@@ -185,8 +180,8 @@ void TwoLevelMotion::renew() {
   } else {
     renewed_ = mesh_ = two_levels(body_.shared_greens(), std::move(state));
   }
-  const std::vector<double> now = moved(*renewed_);
-  for (std::size_t dof = 0; dof < now.size(); ++dof) shift_[dof] -= now[dof];
+  find_by_load(*renewed_, by_load_);
+  for (std::size_t dof = 0; dof < shift_.size(); ++dof) shift_[dof] -= by_load_[dof];
   std::erase_if(kept_, [](const auto& old) { return old.use_count() == 1; });
   kept_.push_back(renewed_);
   const std::lock_guard lock(mutex_);

@@ -41,6 +41,8 @@ class TwoLevelMotion final : public MotionStepper {
   /// Compliance of the mesh in the state of W. The tick's has the local compliance in place of the mesh's
   /// own.
   [[nodiscard]] const Greens& now() const noexcept { return mesh_ != nullptr ? *mesh_ : body_.greens(); }
+  /// u [n + n_q] by the forces of the last balance.
+  void find_by_load(const Greens& W, std::vector<double>& u) const;
   void take_load(const NodalLoad& load);
   TwoLevelReport find();
   [[nodiscard]] bool must_renew() const;
@@ -49,16 +51,18 @@ class TwoLevelMotion final : public MotionStepper {
   void tell(const TwoLevelReport& report);
 
   const Body& body_;
-  CoarseParts parts_;
+  const CoarseParts& parts_;
+  std::shared_ptr<const Greens> field_at_rest_;  // for its coarse displacement
   TwoLevels levels_;
-  int failures_ = 0;                                 // searches in a row that found no balance
-  std::vector<Index> nodes_;                         // loaded in the job, each once
-  std::vector<double> f_, places_;                   // [d nodes_] their forces and displacements in the tick
-  std::vector<Mat3> R_renewed_;                      // [stored] rotations of W
-  std::vector<double> by_load_;                      // [n] W f
-  std::vector<double> x_, x_before_;                 // [n] displacement by the last job, and the one before
-  std::vector<double> shift_;                        // [n] by the last change of W; empty: there was none
-  std::vector<double> without_;                      // [n] displacement passed to the tick: x_ - W f
+  int failures_ = 0;                // searches in a row that found no balance
+  std::vector<Index> nodes_;        // loaded in the job, each once
+  std::vector<double> f_, places_;  // [d nodes_] their forces and displacements in the tick
+  std::vector<Mat3> R_renewed_;     // [stored] rotations of W
+  // [n + n_q] of the stored dofs and of the coarse field:
+  std::vector<double> by_load_;                      // W f
+  std::vector<double> x_, x_before_;                 // displacement by the last job, and the one before
+  std::vector<double> shift_;                        // by the last change of W; empty: there was none
+  std::vector<double> without_;                      // displacement passed to the tick: x_ - W f
   std::shared_ptr<const Greens> renewed_, mesh_;     // W, and that of now(); null: those of the body at rest
   std::vector<std::shared_ptr<const Greens>> kept_;  // until the tick has released them: the tick frees none
   mutable std::mutex mutex_;                         // guards telling_

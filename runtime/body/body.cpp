@@ -166,13 +166,16 @@ struct Body::Made {
 };
 
 Body::Made Body::make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
-                      bool local) {
+                      bool local, const DeepParts& deep) {
   BodyParts parts{.name = model.name,
                   .greens = take_greens(model, options, contact),
                   .contact_model = contact,
                   .swing = {model.dynamics.method, model.dynamics.newmark, model.dynamics.damping},
+                  .coarse = deep.nodes,
                   .refinement = refinement};
-  if (model.dynamics.method == DynamicsMethod::modal) {
+  if (deep.nodes != nullptr) {
+    parts.swing = {.method = DynamicsMethod::packed, .newmark = {.time_step = deep.step}, .damping = {}};
+  } else if (model.dynamics.method == DynamicsMethod::modal) {
     parts.modes = make_modes(model);
     model.dynamics.shapes = {};
     if (contact == ContactModel::dynamic)
@@ -210,6 +213,11 @@ Body::Body(Made made)
 
 Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact, bool local)
     : Body(make(std::move(model), options, refinement, contact, local)) {}
+
+Body::Body(Model model, DeepParts deep, int refinement, bool local)
+    : Body(make(std::move(model), {}, refinement, ContactModel::two_level, local, deep)) {
+  coarse_parts_ = std::move(deep.coarse);
+}
 
 Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options)
     : Body(std::move(model), options, 1, ContactModel::live) {

@@ -11,7 +11,15 @@
 
 namespace palpate {
 
+struct CoarseParts;
 struct LiveParts;
+
+/// Coarse body of a body on two levels.
+struct DeepParts {
+  std::shared_ptr<const CoarseParts> coarse;
+  std::shared_ptr<const CoarseNodes> nodes;  ///< of `coarse`
+  double step = 0.0;                         ///< time between two balances [s]
+};
 
 /// A baked model as an elastic body, and the numbering that links the two: mesh nodes and stored nodes. May
 /// be used by any number of threads.
@@ -25,6 +33,8 @@ class Body : public ElasticBody {
   /// dynamics.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
                 ContactModel contact = ContactModel::quasi_static, bool local = false);
+  /// Body on two levels; `deep` comes from the same model.
+  Body(Model model, DeepParts deep, int refinement, bool local);
   /// Body that is solved during the touch; `live` comes from `live_model` of the same model.
   Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options = {});
 
@@ -32,6 +42,9 @@ class Body : public ElasticBody {
   [[nodiscard]] const Model& model() const noexcept { return model_; }
   /// Solver that runs beside the tick; null if the Green's functions describe the body.
   [[nodiscard]] const LiveParts* live() const noexcept { return live_.get(); }
+
+  /// Coarse body of a body on two levels; null for others.
+  [[nodiscard]] const CoarseParts* coarse_parts() const noexcept { return coarse_parts_.get(); }
 
   /// Stored node of a mesh node; -1 if it is held along every axis or not stored.
   [[nodiscard]] Index stored_node(Index mesh_node) const noexcept { return stored_of_mesh_[mesh_node]; }
@@ -61,7 +74,7 @@ class Body : public ElasticBody {
 
   struct Made;
   static Made make(Model model, const GreensOptions& options, int refinement, ContactModel contact,
-                   bool local);
+                   bool local, const DeepParts& deep = {});
   explicit Body(Made made);
 
   Model model_;
@@ -69,6 +82,7 @@ class Body : public ElasticBody {
   FineSurface fine_;
   std::shared_ptr<const Rounding> rounding_;
   std::shared_ptr<const LiveParts> live_;
+  std::shared_ptr<const CoarseParts> coarse_parts_;
 };
 
 }  // namespace palpate

@@ -20,30 +20,69 @@ using Eigen::VectorXd;
 
 constexpr double parts_of_cell = 3.0;  // along each axis
 
-using Term = std::array<Index, 3>;  // its dofs
-
-/// Gradients of the terms of a quadrature point [1/m].
-std::map<Term, Vec3> terms_of(const LiveBody& fine, const CoarseField& field, Index point) {
-  const Mesh& mesh = fine.mesh();
-  const Index d = fine.dimension();
-  std::map<Term, Vec3> terms;
-  Eigen::Index k = 0;
-  for (const Index node : mesh.element_nodes(point / fine.points())) {
-    const Vec3 N = fine.gradients(point).col(k++);
-    field.for_each_node(field.place(mesh.nodes[static_cast<std::size_t>(node)]),
-                        [&](Index coarse, double weight, const Vec3&) {
-                          Term dofs = {-1, -1, -1};
-                          for (Index axis = 0; axis < d; ++axis)
-                            if (fine.free_of_dof()[static_cast<std::size_t>(d * node + axis)] >= 0)
-                              dofs[static_cast<std::size_t>(axis)] = d * coarse + axis;
-                          terms.try_emplace(dofs, Vec3::Zero()).first->second += weight * N;
-                        });
-  }
-  terms.erase({-1, -1, -1});  // of held nodes
-  return terms;
-}
-
 }  // namespace
+
+/// The terms of a body: what coarse nodes move along the axes along which a mesh node is free.
+class CoarseBody::Terms {
+ public:
+  Terms(const LiveBody& fine, const CoarseField& field)
+      : fine_(fine), field_(field), place_(static_cast<std::size_t>(8 * field.nodes()), -1) {
+    const auto d = static_cast<std::size_t>(fine.dimension());
+    for (std::size_t node = 0; node < fine.mesh().nodes.size(); ++node) {
+      at_.push_back(field.place(fine.mesh().nodes[node]));
+      unsigned free = 0;
+      for (std::size_t axis = 0; axis < d; ++axis)
+        if (fine.free_of_dof()[d * node + axis] >= 0) free |= 1U << axis;
+      free_.push_back(free);
+    }
+  }
+
+  /// Numbers the terms of a part with these quadrature points; `dofs` [3 terms] of the coarse field, by axis,
+  /// -1: held, or not in the plane.
+  void number(const std::vector<Index>& points, std::vector<Index>& dofs) {
+    for (const std::size_t key : keys_) place_[key] = -1;
+    keys_.clear();
+    for (const Index point : points) {
+      for (const Index node : fine_.mesh().element_nodes(point / fine_.points()))
+        for_each_key(node, [&](std::size_t key, double) {
+          if (place_[key] >= 0) return;
+          place_[key] = std::ssize(keys_);
+          keys_.push_back(key);
+        });
+    }
+    for (const std::size_t key : keys_) {
+      for (Index axis = 0; axis < 3; ++axis)
+        dofs.push_back((key >> axis & 1U) != 0 ? fine_.dimension() * static_cast<Index>(key / 8) + axis : -1);
+    }
+  }
+  [[nodiscard]] Eigen::Index count() const noexcept { return std::ssize(keys_); }
+  /// Calls visit(term, gradient [1/m]) for a quadrature point, more than once for each.
+  template <class Visit>
+  void for_each_gradient(Index point, const Visit& visit) const {
+    Eigen::Index k = 0;
+    for (const Index node : fine_.mesh().element_nodes(point / fine_.points())) {
+      const Vec3 N = fine_.gradients(point).col(k++);
+      for_each_key(node, [&](std::size_t key, double weight) { visit(place_[key], Vec3(weight * N)); });
+    }
+  }
+
+ private:
+  template <class Visit>
+  void for_each_key(Index node, const Visit& visit) const {
+    const unsigned free = free_[static_cast<std::size_t>(node)];
+    if (free == 0) return;
+    field_.for_each_node(at_[static_cast<std::size_t>(node)], [&](Index coarse, double weight, const Vec3&) {
+      visit(8 * static_cast<std::size_t>(coarse) + free, weight);
+    });
+  }
+
+  const LiveBody& fine_;
+  const CoarseField& field_;
+  std::vector<CoarsePlace> at_;      // [mesh nodes]
+  std::vector<unsigned> free_;       // [mesh nodes] bit `axis`: free along it
+  std::vector<Eigen::Index> place_;  // [8 coarse nodes] of each key, a coarse node and the axes, in keys_; -1
+  std::vector<std::size_t> keys_;    // of the part's terms
+};
 
 /// A part at some q.
 struct CoarseBody::State {
@@ -72,33 +111,24 @@ CoarseBody::CoarseBody(const LiveBody& fine, const CoarseField& field) : fine_(f
           static_cast<Index>(std::clamp(0.5 * (at.in_cell[axis] + 1.0), 0.0, 0.999) * parts_of_cell);
     points[key].push_back(point);
   }
-  for (const auto& [key, of_part] : points) measure(field, of_part, parts_.emplace_back());
+  Terms terms(fine, field);
+  for (const auto& [key, of_part] : points) measure(terms, of_part, parts_.emplace_back());
 }
 
-void CoarseBody::measure(const CoarseField& field, const std::vector<Index>& points, Part& part) const {
-  std::map<Term, Eigen::Index> number;
-  std::vector<std::map<Term, Vec3>> all;
-  for (const Index point : points) {
-    for (const auto& [term, gradient] : all.emplace_back(terms_of(fine_, field, point)))
-      number.emplace(term, 0);
-  }
-  Eigen::Index terms = 0;
-  for (auto& [term, at] : number) {
-    at = terms++;
-    part.dofs.insert(part.dofs.end(), term.begin(), term.end());
-  }
+void CoarseBody::measure(Terms& of_body, const std::vector<Index>& points, Part& part) const {
+  of_body.number(points, part.dofs);
+  const Eigen::Index terms = of_body.count();
   part.element = points.front() / fine_.points();
   MatrixXd slopes = MatrixXd::Zero(3 * std::ssize(points), terms);  // times the root of the weight
   part.G.setZero(3, terms);
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const double weight = fine_.weight(points[k]);
+    const double weight = fine_.weight(points[k]), root = std::sqrt(weight);
     part.volume += weight;
-    for (const auto& [term, gradient] : all[k]) {
-      part.G.col(number[term]) += weight * gradient;
+    of_body.for_each_gradient(points[k], [&](Eigen::Index term, const Vec3& gradient) {
+      part.G.col(term) += weight * gradient;
       for (Eigen::Index axis = 0; axis < 3; ++axis)
-        slopes(axis * std::ssize(points) + static_cast<Eigen::Index>(k), number[term]) =
-            std::sqrt(weight) * gradient[axis];
-    }
+        slopes(axis * std::ssize(points) + static_cast<Eigen::Index>(k), term) += root * gradient[axis];
+    });
   }
   part.G /= part.volume;
   part.K.setZero(3 * terms, 3 * terms);

@@ -35,8 +35,9 @@ class CoarseBody {
     Eigen::MatrixXd K;        // [3 terms x 3 terms] of small strain, by the gradients' variation [N/m]
   };
   struct State;
+  class Terms;
 
-  void measure(const CoarseField& field, const std::vector<Index>& points, Part& part) const;
+  void measure(Terms& of_body, const std::vector<Index>& points, Part& part) const;
   [[nodiscard]] State state(const Part& part, const Eigen::VectorXd& q) const;
 
   const LiveBody& fine_;

@@ -21,7 +21,6 @@ constexpr double floor_of_group =
     1e-5;  // compliance of a group beside its own, as a share of a node's at rest
 constexpr int most_halvings = 30;
 constexpr double most_of_cell = 0.3;     // of its edge, by which a coarse node moves in a step at most
-constexpr double most_of_mesh = 0.8;     // dofs of a coarse body, of its mesh's
 constexpr double rounding = 1e-9;        // of the largest q: a step that is not made
 constexpr double least_stiffness = 0.2;  // of the coarse field in the tick, as a share of that at rest
 constexpr double most_lag = 0.05;        // share of q, in the norm of K_c, by which the tangent of E may lag
@@ -124,23 +123,8 @@ void TwoLevels::rest() {
 }
 
 TwoLevels::AtNode TwoLevels::at_node(Index node, const VectorXd& q) const {
-  AtNode at;
-  const CoarseNodes& nodes = *parts_->nodes;
-  const unsigned axes = nodes.axes[static_cast<std::size_t>(node)];
-  Mat3 F = Mat3::Identity();
-  nodes.field.for_each_node(
-      nodes.place[static_cast<std::size_t>(node)], [&](Index k, double weight, const Vec3& gradient) {
-        const Vec3 part = vector_at({q.data(), static_cast<std::size_t>(q.size())}, dimension_, k);
-        F += part * gradient.transpose();
-        at.moved += weight * part;
-      });
-  for (int axis = 0; axis < 3; ++axis)
-    if (((axes >> axis) & 1U) == 0) at.moved[axis] = 0.0;
-  if (nodes.turns(node)) {
-    at.R = dimension_ == 3 ? nearest_rotation(F) : nearest_rotation_in_plane(F);
-    at.G = spin_of_skew(at.R, F);
-  }
-  return at;
+  const CoarseAt at = coarse_at(*parts_->nodes, node, {q.data(), static_cast<std::size_t>(q.size())});
+  return {at.moved, at.R, parts_->nodes->turns(node) ? spin_of_skew(at.R, at.F) : Mat3(Mat3::Zero())};
 }
 
 void TwoLevels::make_contact(std::span<const Index> nodes, std::span<const double> f,
@@ -433,35 +417,6 @@ TwoLevelState TwoLevels::state(std::vector<Index> near) {
           .H_inverse = stiff_inverse(H_, parts_->K),
           .columns = columns_,
           .near = std::move(near)};
-}
-
-CoarseParts make_coarse_parts(std::shared_ptr<const LiveBody> fine, std::span<const Index> stored_nodes,
-                              Index most_dofs) {
-  const Mesh& mesh = fine->mesh();
-  const auto d = static_cast<std::size_t>(fine->dimension());
-  std::vector<Vec3> free;
-  std::vector<std::uint8_t> axes(mesh.nodes.size(), 0);
-  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
-    for (std::size_t axis = 0; axis < d; ++axis)
-      if (fine->free_of_dof()[d * node + axis] >= 0)
-        axes[node] = static_cast<std::uint8_t>(axes[node] | 1U << axis);
-    if (axes[node] != 0) free.push_back(mesh.nodes[node]);
-  }
-  // A field as fine as the mesh has slopes at the nodes that nodes do not decide.
-  const Index most =
-      std::min(most_dofs, static_cast<Index>(most_of_mesh * static_cast<double>(fine->free_dofs())));
-  auto nodes = std::make_shared<CoarseNodes>(CoarseNodes{
-      .field = coarse_field(fine->dimension(), free, most), .place = {}, .axes = {}, .compliance = {}});
-  for (const Index node : stored_nodes) {
-    nodes->place.push_back(nodes->field.place(mesh.nodes[static_cast<std::size_t>(node)]));
-    nodes->axes.push_back(axes[static_cast<std::size_t>(node)]);
-  }
-  CoarseParts parts{.fine = std::move(fine), .body = nullptr, .nodes = nullptr, .K = {}};
-  parts.body = std::make_unique<const CoarseBody>(*parts.fine, nodes->field);
-  parts.K = parts.body->tangent(VectorXd::Zero(parts.body->dofs()));
-  nodes->compliance = Eigen::LLT<MatrixXd>(parts.K).solve(MatrixXd::Identity(parts.K.rows(), parts.K.cols()));
-  parts.nodes = std::move(nodes);
-  return parts;
 }
 
 }  // namespace palpate

@@ -7,17 +7,9 @@
 #include <vector>
 
 #include "runtime/core/body/two_level_greens.h"
-#include "runtime/depth/coarse_body.h"
+#include "runtime/depth/coarse_parts.h"
 
 namespace palpate {
-
-/// A coarse body, and how the Green's functions' nodes follow it.
-struct CoarseParts {
-  std::shared_ptr<const LiveBody> fine;
-  std::unique_ptr<const CoarseBody> body;
-  std::shared_ptr<const CoarseNodes> nodes;
-  Eigen::MatrixXd K;  ///< K_c, tangent at rest [N/m]
-};
 
 /// Statistics of a search for balance.
 struct TwoLevelReport {
@@ -44,6 +36,10 @@ class TwoLevels {
   /// Nodes loaded in the last balance, each once, and their forces [dm] [N].
   [[nodiscard]] std::span<const Index> loaded() const noexcept { return loaded_; }
   [[nodiscard]] const std::vector<double>& forces() const noexcept { return forces_; }
+  /// The coarse field q at the balance [n_q] [m].
+  [[nodiscard]] std::span<const double> field() const noexcept {
+    return {q_.data(), static_cast<std::size_t>(q_.size())};
+  }
   /// Displacement of all stored nodes at the balance [n] [m].
   [[nodiscard]] const std::vector<double>& displacement() const noexcept { return u_; }
   /// Rotation of each stored node, and what it does to the remainder [nodes].
@@ -91,10 +87,5 @@ class TwoLevels {
   std::vector<double> s_, u_;  // [n] remainder and displacement of all stored nodes
   std::vector<CoarseTurn> turns_;
 };
-
-/// Makes the coarse body of a mesh whose stored nodes are given, with at most `most_dofs` and 0.8 of the
-/// mesh's dofs.
-CoarseParts make_coarse_parts(std::shared_ptr<const LiveBody> fine, std::span<const Index> stored_nodes,
-                              Index most_dofs);
 
 }  // namespace palpate

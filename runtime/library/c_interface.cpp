@@ -173,6 +173,7 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
                          ? OverlayOptions{}
                          : OverlayOptions{.kind = OverlayKind::none};
   settings.overlay_memory = overlay.memory;
+  settings.depth = Depth::no;
   settings.rate = whole_rate(options.tick);
   return settings;
 }

@@ -75,8 +75,7 @@ struct OwnLoop {
     publish();
     if (overlay.refinement > 1)
       overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = overlay.memory});
-    if (body.model().dynamics.method == DynamicsMethod::packed)
-      motion.emplace(body, state, MotionSourceOptions{});
+    if (body.swing().method == DynamicsMethod::packed) motion.emplace(body, state, MotionSourceOptions{});
     if (stress_ticks > 0) {
       frames.emplace(body, state, SurfaceFramesOptions{.ticks_per_frame = stress_ticks},
                      [this](SurfacePicture picture) {

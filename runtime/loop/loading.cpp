@@ -19,7 +19,7 @@
 #include "formats/model_file.h"
 #include "matrices/hierarchical.h"
 #include "runtime/body/scaled_model.h"
-#include "runtime/depth/deep_model.h"
+#include "runtime/depth/deep_body.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
 
@@ -57,6 +57,12 @@ void check_depth(const BodyOptions& options) {
   if (options.live.solver) refuse("a live solver turns by itself, and has no Green's functions", "--solver");
   if (options.has_overlays()) refuse("patches are of the body at rest, and do not turn", "--overlay");
   if (options.contact == ContactModel::dynamic) refuse("a body on two levels has no inertia", "--contact");
+}
+
+bool is_on_two_levels(const Model& model, const BodyOptions& options) {
+  if (options.depth != Depth::automatic) return options.depth == Depth::yes;
+  return !options.live.solver && !options.has_overlays() && options.contact == ContactModel::quasi_static &&
+         goes_deep(model);
 }
 
 /// Checks that a model fits neo-Hookean overlays, and drops the data that they do not use.
@@ -104,7 +110,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     warn_once(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
-  if (options.depth) check_depth(options);
+  if (options.depth == Depth::yes) check_depth(options);
   if (options.overlay_law != PatchLaw::linear) prepare_for_law(model, options);
   if (options.live.solver) {
     if (options.has_overlays()) {
@@ -122,8 +128,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   if (const std::string warning = rest_warning(model); !warning.empty())
     warn_once(file.string() + ": " + warning);
   const MetSurface met = met_surface(model, options);
-  if (options.depth)
-    return Body(deep_model(std::move(model)), {}, met.refinement, ContactModel::two_level, met.is_local);
+  if (is_on_two_levels(model, options)) return deep_body(std::move(model), met.refinement, met.is_local);
   return Body(std::move(model), {}, met.refinement, options.contact, met.is_local);
 }
 

@@ -8,6 +8,7 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
 #include "runtime/body/met_surface.h"
+#include "runtime/depth/deep_body.h"
 #include "runtime/live/live_settings.h"
 
 namespace palpate {
@@ -23,7 +24,7 @@ struct BodyOptions {
   double load_scale = 1.0;  ///< see scale_loads
   double stiffness_scale = 1.0;
   LiveSettings live{};
-  bool depth = false;  ///< on two levels, see TwoLevels
+  Depth depth = Depth::no;
 
   [[nodiscard]] bool has_overlays() const noexcept { return refinement > 1 || graded; }
   bool operator==(const BodyOptions&) const = default;

@@ -153,6 +153,10 @@ void read_value(const Setting& setting, const std::string& text, bool& yes) {
   yes = read_name(setting, text, {true, false});
 }
 
+void read_value(const Setting& setting, const std::string& text, Depth& depth) {
+  depth = read_name(setting, text, {Depth::automatic, Depth::yes, Depth::no});
+}
+
 void read_value(const Setting& setting, const std::string& text, PatchLaw& law) {
   law = read_name(setting, text, {PatchLaw::linear, PatchLaw::neo_hookean});
 }
@@ -261,10 +265,10 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
         s.overlay_memory);
   visit(
       Setting{
-          "depth", group, "yes|no", "", "no",
+          "depth", group, "auto|yes|no", "", "auto",
           "presses as deep as a hand's: the body turns and bends far, by a coarse body of large strain under "
-          "its Green's functions",
-          any_number, s.depth},
+          "its Green's functions; auto: static bodies in space; no: small strain",
+          any_number, s.depth != Depth::automatic},
       s.depth);
 }
 

@@ -33,10 +33,10 @@ struct Settings {
   OverlayOptions overlay;
   PatchLaw overlay_law = PatchLaw::linear;
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
-  bool depth = false;                                        ///< the body on two levels
-  LiveSettings live;                                         ///< a solver in place of Green's functions
-  std::int64_t rate = 1000;                                  ///< ticks per second
-  double motion_scale = 1.0;                                 ///< see WorkspaceOptions
+  Depth depth = Depth::automatic;
+  LiveSettings live;          ///< a solver in place of Green's functions
+  std::int64_t rate = 1000;   ///< ticks per second
+  double motion_scale = 1.0;  ///< see WorkspaceOptions
   double force_scale = 1.0;
   std::optional<Vec3> origin;           ///< origin of the device in the body's frame [m]
   std::string axes = "x,y,z";           ///< the body's axes along the device's axes

@@ -81,22 +81,22 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
 test('depth is turned on and off, and keeps out what it has no place for', async (t) => {
   const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 2\n', args: ['--tool', 'sphere:0.1'] });
   const studied = async () => (180 / Math.PI) * (await told(page, 'state')).model.studied_rotation;
-  near(await studied(), 19, 0.01, 'range of small strain');
+  near(await studied(), 90, 0.01, 'range of two levels, which a static body is on');
   const turn = async (name, value, key = name) => {
     await part(page, name).click();
     await until(page, ([key, now]) => (window.palpate.state.settings[key] ?? null) === now && !window.palpate.state.busy, [key, value]);
     await until(page, () => window.palpate.ready);
   };
-  await turn('two-levels', 'yes', 'depth');
-  near(await studied(), 90, 0.01, 'range of two levels');
-  assert.equal(await part(page, 'overlay').isDisabled(), true);
-  assert.match(await part(page, 'overlay').getAttribute('title'), /Not with depth/);
+  assert.equal(await part(page, 'two-levels').isChecked(), true);
   await choose(page, 'press', 0.02);
   const felt = await pressed(page, top);
   assert.ok(felt.force[2] < 0, `it pushes the body down: ${felt.force}`);
+  await turn('two-levels', 'no', 'depth');
+  near(await studied(), 19, 0.01, 'range of small strain');
   await turn('two-levels', null, 'depth');
-  near(await studied(), 19, 0.01, 'range of small strain again');
-  await turn('overlay', 'r=3,rings=2');
+  near(await studied(), 90, 0.01, 'range of two levels again');
+  await turn('overlay', 'r=3,rings=2'); // takes the place of depth
+  near(await studied(), 19, 0.01, 'range of overlays');
   assert.equal(await part(page, 'two-levels').isDisabled(), true);
   assert.match(await part(page, 'two-levels').getAttribute('title'), /Not with overlay/);
   assert.deepEqual(page.complaints, []);

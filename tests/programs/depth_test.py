@@ -1,4 +1,4 @@
-"""Bodies on two levels, which turn and bend far, through palpate-runtime play --depth yes."""
+"""Bodies on two levels, which turn and bend far, through palpate-runtime play."""
 
 import json
 import math
@@ -57,7 +57,7 @@ class Depth(ProgramTest):
         file = self.bake(TONGUE)
         deep, report, said = self.play(file, 60, "--depth", "yes")
         live, _, _ = self.play(file, 60, "--solver", "corotational", "--mass-damping", "20")
-        linear, of_linear, _ = self.play(file, 60)
+        linear, of_linear, _ = self.play(file, 60, "--depth", "no")
         print(f"at the end: corotational {live[-1]:.5f} N, deep {deep[-1] / live[-1] - 1:+.2%}, linear {linear[-1] / live[-1] - 1:+.2%}")
         self.assertAlmostEqual(deep[-1] / live[-1], 1.0, delta=0.05)
         self.assertGreater(abs(linear[-1] / live[-1] - 1.0), 0.2)
@@ -94,12 +94,18 @@ class Depth(ProgramTest):
         self.assertGreater(of_plain[-1], 0)
         self.assertAlmostEqual(of_compressed[-1] / of_plain[-1], 1.0, delta=1e-4)
 
-    def test_without_it_nothing_is_another(self):
+    def test_static_bodies_in_space_are_on_two_levels(self):
+        def same(file, depth, *arguments):
+            plain, _, _ = self.play(file, 20, *arguments, seconds=0.2)
+            asked, _, _ = self.play(file, 20, "--depth", depth, *arguments, seconds=0.2)
+            self.assertGreater(plain[-1], 0)
+            numpy.testing.assert_array_equal(plain, asked)
+
         file = self.bake(TONGUE)
-        plain, _, _ = self.play(file, 20, seconds=0.2)
-        off, _, _ = self.play(file, 20, "--depth", "no", seconds=0.2)
-        self.assertGreater(plain[-1], 0)
-        numpy.testing.assert_array_equal(plain, off)
+        same(file, "yes")
+        same(file, "no", "--overlay", "r=2,rings=1")
+        file.unlink()
+        same(self.bake(TONGUE + '[dynamics]\nmethod = "modal"\nmodes = 4\n'), "no")
 
     def test_runs_are_equal_and_replay(self):
         file = self.bake(TONGUE)

@@ -148,7 +148,7 @@ class Felt(ProgramTest):
             hand.still = hand.still + 1 if abs(wanted - hand.height) < 5e-6 else 0
             return hand.height + 0.05 * (wanted - hand.height)
         Hand.still = 0
-        runtime = self.play("--overlay", "no")  # a fine surface's force at such depth depends on the way there
+        runtime = self.play("--overlay", "no", "--depth", "no")  # as `probe`; a fine surface's force at such depth depends on the way there
         hand = self.own_hand(drawn)
         self.wait_for(lambda: hand.still > 500, runtime)
         runtime.send_signal(signal.SIGINT)
@@ -166,7 +166,7 @@ class Felt(ProgramTest):
         # The same place by a script, in another run without a hand.
         height = 0.12 + z.mean()
         script = self.write("there.csv", f"t,x,y,z\n0,0.05,0.05,0.13\n0.5,0.05,0.05,{height}\n1.5,0.05,0.05,{height}\n")
-        done(RUNTIME, "play", self.file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--overlay", "no", "--coupling", "2000", "--fast", "--record", "there.mcap", cwd=self.folder)
+        done(RUNTIME, "play", self.file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--overlay", "no", "--depth", "no", "--coupling", "2000", "--fast", "--record", "there.mcap", cwd=self.folder)
         there = palpate.read(self.folder / "there.mcap")
         self.assertAlmostEqual(shown[:, 2].mean(), -there["force"][-1, 2], delta=2e-3)
 

@@ -101,7 +101,7 @@ class Ball(ProgramTest):
     def test_an_own_loop_feels_the_same(self):
         path = [(0.0, 0.0, 0.062 - 0.0001 * k) for k in range(50)]
         script = self.write("loop.csv", "t,x,y,z\n" + "".join(f"{0.001 * k:.3f},{x},{y},{z:.6f}\n" for k, (x, y, z) in enumerate(path)))
-        recording, _ = self.play("tet4", script)
+        recording, _ = self.play("tet4", script, "--depth", "no")
         played = palpate.read(recording)
         with palpate.Session(self.files["tet4"], palpate.Tool(radius=self.TOOL, friction=0, reach=1.0), max_contacts=256,
                              overlay=palpate.Overlay(refinement=0)) as session:

@@ -158,7 +158,7 @@ class IgtlTest(ProgramTest):
 
 class Messages(IgtlTest):
     def test_are_what_the_run_recorded(self):
-        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.mcap", "--duration", "3",
+        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--depth", "no", "--record", "out.mcap", "--duration", "3",
                           script=TOUCH) as (play, program, connect):
             client = connect()
             messages = list(iter(client.next, None))

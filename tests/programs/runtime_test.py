@@ -341,7 +341,7 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(4))
         script = self.write("touch.csv", TOUCH)
         for name in ("one.mcap", "two.mcap"):
-            result = self.play(file, "--device", f"script:{script}", "--fast", "--record", name, "--report", "-")
+            result = self.play(file, "--device", f"script:{script}", "--fast", "--depth", "no", "--record", name, "--report", "-")
             self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual((self.folder / "one.mcap").read_bytes(), (self.folder / "two.mcap").read_bytes())
 
@@ -515,7 +515,7 @@ class PlayOverlay(ProgramTest):
         fine = self.bake(cube_toml(4, scope="full"), name="fine.toml")
         script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.17\n0.3,0.45,0.5,1.17\n")
         forces, surfaces = [], []
-        for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ("--overlay", "no"))):
+        for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ("--overlay", "no", "--depth", "no"))):
             has_patches = file == coarse
             result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.mcap",
                          "--surface", "out.vtu", "--report", "report.json", "--force", *overlay, cwd=self.folder)

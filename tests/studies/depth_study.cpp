@@ -17,7 +17,7 @@
 
 #include "formats/model_file.h"
 #include "runtime/background/motion_source.h"
-#include "runtime/depth/deep_model.h"
+#include "runtime/depth/deep_body.h"
 #include "tests/support/bodies/whole_press.h"
 
 namespace palpate::test {
@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
     if (beside < radius * radius) touch = std::min(touch, along - std::sqrt(radius * radius - beside));
   }
   from += touch * direction;
-  const Body linear{Model(model)}, deep(deep_model(model), {}, 1, ContactModel::two_level);
+  const Body linear{Model(model)}, deep = deep_body(model);
   fmt::print("depth,points,linear,whole_of_linear,two_levels,whole,linear_off,two_levels_off\n");
   for (int k = 9; k < argc; ++k) {
     const test::Felt by_linear = test::felt(linear, radius, from, direction, number(k)),

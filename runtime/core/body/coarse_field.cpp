@@ -20,7 +20,7 @@ Index along(int dimension, const std::array<Index, 3>& cells, int axis) {
 
 /// Renumbers the nodes whose values at some points are independent, given their Gram matrix; others become
 /// -1.
-Index drop_dependent(const Eigen::MatrixXd& gram, std::vector<Index>& number) {
+Index number_independent(const Eigen::MatrixXd& gram, std::vector<Index>& number) {
   const Eigen::LDLT<Eigen::MatrixXd> pivoted(gram);
   Eigen::VectorXi order =
       Eigen::VectorXi::LinSpaced(static_cast<int>(gram.rows()), 0, static_cast<int>(gram.rows()) - 1);
@@ -44,7 +44,6 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
   for (int axis = 0; axis < dimension; ++axis)
     edge_[axis] = (high - low)[axis] / static_cast<double>(cells[static_cast<std::size_t>(axis)]);
   const Index nx = along(dimension, cells, 0), ny = along(dimension, cells, 1);
-  Index all = 0;
   std::vector<Index> number(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) *
                                 static_cast<std::size_t>(along(dimension, cells, 2)),
                             -1);
@@ -66,10 +65,13 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
   set_cells([](std::size_t lattice) { return static_cast<Index>(lattice); });
   for (const Vec3& x : points)  // the nodes of cells that hold some
     for_each_node(place(x), [&](Index node, double, const Vec3&) {
-      if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = all++;
+      if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = nodes_++;
     });
   set_cells([&](std::size_t lattice) { return number[lattice]; });
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(all, all);
+}
+
+void CoarseField::drop_dependent(std::span<const Vec3> points) {
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(nodes_, nodes_);
   std::array<std::pair<Index, double>, 27> weights;
   for (const Vec3& x : points) {
     std::size_t count = 0;
@@ -81,8 +83,8 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
         gram(weights[a].first, weights[b].first) += weights[a].second * weights[b].second;
     }
   }
-  std::vector<Index> kept(static_cast<std::size_t>(all));
-  nodes_ = drop_dependent(gram, kept);
+  std::vector<Index> kept(static_cast<std::size_t>(nodes_));
+  nodes_ = number_independent(gram, kept);
   for (Index& node : node_)
     if (node >= 0) node = kept[static_cast<std::size_t>(node)];
 }
@@ -120,8 +122,10 @@ CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_
   for (int axis = 0; axis < dimension; ++axis)  // one layer of free nodes has no extent across
     if (box.sizes()[axis] < least_extent * longest)
       box.max()[axis] = box.min()[axis] + least_extent * longest;
-  std::array<Index, 3> cells = {1, 1, 1};
-  CoarseField best(dimension, box.min(), box.max(), cells, nodes);
+  const auto field_of = [&](const std::array<Index, 3>& cells) {
+    return CoarseField(dimension, box.min(), box.max(), cells, nodes);
+  };
+  std::array<Index, 3> cells = {1, 1, 1}, best = cells;
   for (double edge = longest; edge > 0.02 * longest; edge *= 0.95) {
     std::array<Index, 3> finer = {1, 1, 1};
     for (int axis = 0; axis < dimension; ++axis)
@@ -129,11 +133,14 @@ CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_
           std::max(Index{1}, static_cast<Index>(std::lround(box.sizes()[axis] / edge)));
     if (finer == cells) continue;
     cells = finer;
-    CoarseField next(dimension, box.min(), box.max(), cells, nodes);
+    CoarseField next = field_of(cells);
+    if (next.dofs() > most_dofs) next.drop_dependent(nodes);
     if (next.dofs() > most_dofs) break;
-    best = std::move(next);
+    best = cells;
   }
-  return best;
+  CoarseField field = field_of(best);
+  field.drop_dependent(nodes);
+  return field;
 }
 
 }  // namespace palpate

@@ -26,9 +26,12 @@ struct CoarsePlace {
 class CoarseField {
  public:
   /// Grid of `cells` along each axis over a box; in the plane one along z. Its nodes are those of cells that
-  /// hold some of `points`, without those whose values at these points others have too.
+  /// hold some of `points`.
   CoarseField(int dimension, const Vec3& low, const Vec3& high, const std::array<Index, 3>& cells,
               std::span<const Vec3> points);
+
+  /// Leaves out the nodes whose values at the points others have too. Call at most once.
+  void drop_dependent(std::span<const Vec3> points);
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
   [[nodiscard]] Index nodes() const noexcept { return nodes_; }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "runtime/core/body/two_level_greens.h"
 #include "runtime/core/solve/tick_tuning.h"
 
 namespace palpate {
@@ -23,6 +24,7 @@ ElasticBody::ElasticBody(BodyParts parts)
       contact_model_(parts.contact_model),
       modes_(std::move(parts.modes)),
       swing_(parts.swing),
+      coarse_(std::move(parts.coarse)),
       refinement_(parts.refinement),
       simplices_(std::move(parts.simplices)),
       surface_friction_(std::move(parts.friction)),
@@ -43,6 +45,10 @@ ElasticBody::ElasticBody(BodyParts parts)
   aggregates_ = SurfaceAggregates(dimension(), simplices(), moves);
   runs_ = NodeRuns(tuning.far.run, greens_->nodes(), dimension(), simplices(), follows);
   measure_surface();
+}
+
+std::int64_t ElasticBody::motion_size() const noexcept {
+  return greens_->order() + (coarse_ != nullptr ? coarse_->dofs() : 0);
 }
 
 void ElasticBody::find_free_nodes(const std::vector<Index>& free) {

@@ -16,6 +16,7 @@
 
 namespace palpate {
 
+struct CoarseNodes;
 class LocalCompliance;
 
 /// Response of the body to contact forces.
@@ -54,7 +55,8 @@ struct BodyParts {
   ContactModel contact_model = ContactModel::quasi_static;
   std::shared_ptr<const Modes> modes{};  ///< null unless the dynamics are modal
   Swing swing{};
-  int refinement = 1;              ///< r: the surface is that of elements cut into r^d
+  std::shared_ptr<const CoarseNodes> coarse{};  ///< of a body on two levels; null for others
+  int refinement = 1;                           ///< r: the surface is that of elements cut into r^d
   std::vector<Index> simplices{};  ///< [F * d] surface nodes of triangles (in the plane, of lines), outward
   std::vector<double> friction{};  ///< [F] Coulomb's coefficient
   std::vector<Vec3> rest{};        ///< [S] positions without a tool [m]
@@ -81,12 +83,17 @@ class ElasticBody {
   [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
   /// The body's own compliance close to a contact; null: the mesh's.
   [[nodiscard]] const std::shared_ptr<const LocalCompliance>& local() const noexcept { return local_; }
+  /// Coarse field of a body on two levels; null for others.
+  [[nodiscard]] const std::shared_ptr<const CoarseNodes>& coarse() const noexcept { return coarse_; }
   /// Null unless the dynamics are modal.
   [[nodiscard]] const Modes* modes() const noexcept { return modes_.get(); }
 
   [[nodiscard]] const Swing& swing() const noexcept { return swing_; }
   /// True if it swings once it is released.
   [[nodiscard]] bool swings() const noexcept { return swing_.method != DynamicsMethod::none; }
+
+  /// Numbers that describe a motion: displacement of the stored dofs, then of the coarse field [n + n_q].
+  [[nodiscard]] std::int64_t motion_size() const noexcept;
 
   /// d, dofs per node: 2 in the plane, 3 in space.
   [[nodiscard]] int dimension() const noexcept { return greens_->dimension(); }
@@ -167,6 +174,7 @@ class ElasticBody {
   ContactModel contact_model_;
   std::shared_ptr<const Modes> modes_;
   Swing swing_;
+  std::shared_ptr<const CoarseNodes> coarse_;
   int refinement_;
   std::vector<Index> simplices_;               // [F * d]
   std::vector<double> surface_friction_;       // [F]

@@ -88,7 +88,7 @@ double velocity_share(double kinetic_energy, double bound) noexcept {
 
 MotionSnapshot::MotionSnapshot(const ElasticBody& body)
     : q(body.modes() != nullptr ? static_cast<std::size_t>(body.modes()->count()) : 0),
-      u(size_if(body.swings(), body.greens().order())) {}
+      u(size_if(body.swings(), body.motion_size())) {}
 
 Vec3 displacement(const ElasticBody& body, const MotionSnapshot& shown, Index stored) noexcept {
   const Vec3 u = vector_at(shown.u, body.dimension(), stored);
@@ -145,7 +145,7 @@ FreeMotion::FreeMotion(const ElasticBody& body, double tick, Index most_loads)
                .untouched{}} {
   const Swing& swing = body.swing();
   const bool packed = swing.method == DynamicsMethod::packed;
-  const std::int64_t n = body.greens().order();
+  const std::int64_t n = body.motion_size();
   if (body.swings()) history_.loads.assign(tuning.body.history, NodalLoad(dimension_, most_loads));
   history_.strains.resize(history_.loads.size());
   held_.u.resize(size_if(body.swings(), n));
@@ -288,6 +288,7 @@ void FreeMotion::end_tick(const ElasticBody& body, const SurfaceLoad& load) noex
     return;
   }
   ++sampled_.job.step;
+  sampled_.job.seen = sampled_.step;
   sampled_.job.left = stills ? decay_ : 1.0;
   sampled_.job.load.clear();
   if (dynamic_contact_) sampled_.job.load.add(now.nodes(), now.forces(), 1.0);
@@ -397,7 +398,7 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
 }
 
 void FreeMotion::take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept {
-  add(u, sign, sampled_.before);
+  add(u, sign, std::span(sampled_.before).first(u.size()));
   sampled_.most_change = -1.0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
     const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));

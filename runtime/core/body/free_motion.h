@@ -31,6 +31,7 @@ double velocity_share(double kinetic_energy, double bound) noexcept;
 struct MotionJob {
   std::int64_t step = 0;    ///< number of the step; a step is a whole number of ticks
   std::int64_t let_go = 0;  ///< number of releases up to this step
+  std::int64_t seen = 0;    ///< step of the last sample received
   LetGo release;            ///< last release
   NodalLoad load;           ///< dynamic contact: forces at the end of the step
   double left = 1.0;        ///< quasi-static contact: factor on the motion
@@ -40,12 +41,14 @@ struct MotionJob {
 struct MotionSample {
   std::int64_t step = 0;    ///< step of the job that it answers
   std::int64_t let_go = 0;  ///< number of releases included
-  std::vector<double> u;    ///< [n] displacement without contact forces at the end of the next step [m]
+  /// [n + n_q] displacement without contact forces at the end of the next step, of the stored dofs and of the
+  /// coarse field [m].
+  std::vector<double> u;
   /// Compliance for contact forces from then on, for a body that is live or on two levels; null: the body's
   /// Green's functions.
   std::shared_ptr<const Greens> compliance{};
-  /// [n] displacement by the job's forces with the compliance before, less that with this one [m]; empty: not
-  /// known.
+  /// [n + n_q] displacement by the job's forces with the compliance before, less that with this one [m];
+  /// empty: not known.
   std::vector<double> shift{};
   /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
@@ -56,7 +59,7 @@ struct MotionSnapshot {
   explicit MotionSnapshot(const ElasticBody& body);
   bool moves = false;     ///< if false, the following is out of date
   std::vector<double> q;  ///< [k]
-  std::vector<double> u;  ///< [n] displacement of the stored degrees of freedom [m]
+  std::vector<double> u;  ///< [n + n_q] displacement of the stored dofs and of the coarse field [m]
 };
 
 /// Displacement of a stored node [m].
@@ -128,8 +131,8 @@ class FreeMotion {
   [[nodiscard]] const MotionJob& job() const noexcept { return sampled_.job; }
   /// Takes over a sample; false if it is out of date.
   bool receive(const MotionSample& sample) noexcept;
-  /// Adds sign * u [n] to the motion until the next sample, to compensate a change of the displacement by
-  /// contact forces when their compliance changes. Call after `receive`.
+  /// Adds sign * u [n or n + n_q] to the motion until the next sample, to compensate a change of the
+  /// displacement by contact forces when their compliance changes. Call after `receive`.
   void take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept;
   [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }  ///< last sample's
   /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.

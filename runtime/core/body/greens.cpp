@@ -268,6 +268,9 @@ std::shared_ptr<const Greens> unfold_or_fold(PackedGreens packed, const GreensOp
 
 }  // namespace
 
+void Greens::coarse_displacement(std::span<const Index>, std::span<const double>,
+                                 std::span<double>) const noexcept {}
+
 const Mat3& Greens::rotation(Index) const noexcept {
   static const Mat3 none = Mat3::Identity();
   return none;

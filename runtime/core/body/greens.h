@@ -74,6 +74,11 @@ class Greens {
   /// Not for the tick: allocates.
   [[nodiscard]] Eigen::MatrixXd block(Index row, Index column) const;
 
+  /// Displacement q of the coarse field [n_q] by the forces of Green's functions on two levels
+  /// (TwoLevelState); nothing for others.
+  virtual void coarse_displacement(std::span<const Index> nodes, std::span<const double> f,
+                                   std::span<double> q) const noexcept;
+
   /// Rotation of a node, with which its compliance has turned.
   [[nodiscard]] virtual const Mat3& rotation(Index node) const noexcept;
   /// Terms in double beside the stored entries; null: none.

@@ -67,18 +67,7 @@ class TwoLevelGreens final : public GreensOnTop {
     const Eigen::Index n = state_.H_inverse.rows();
     Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n), q_rest(a.data(), n),
         q(b.data(), n);
-    P_f.setZero();
-    J_f.setZero();
-    for (std::size_t k = 0; k < nodes.size(); ++k) {
-      const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
-      for_each_block(nodes[k], [&](Index node, double weight, const Vec3& gradient) {
-        add_forces(nodes[k], node, weight, gradient, force, P_f, J_f);
-      });
-      if (const Index c = column_of_[static_cast<std::size_t>(nodes[k])]; c >= 0) {
-        for (Eigen::Index axis = 0; axis < dimension(); ++axis)
-          J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
-      }
-    }
+    find_loads(nodes, f, P_f, J_f);
     if (P_f.isZero(0.0) && J_f.isZero(0.0)) return;
     respond_to(state_.nodes->compliance, P_f, q_rest);
     respond_to(state_.H_inverse, J_f, q);
@@ -91,7 +80,33 @@ class TwoLevelGreens final : public GreensOnTop {
     }
   }
 
+  void coarse_displacement(std::span<const Index> nodes, std::span<const double> f,
+                           std::span<double> q) const noexcept override {
+    Columns load_at_rest, load;
+    const Eigen::Index n = state_.H_inverse.rows();
+    Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n);
+    find_loads(nodes, f, P_f, J_f);
+    respond_to(state_.H_inverse, J_f, Eigen::Map<Eigen::VectorXd>(q.data(), n));
+  }
+
  private:
+  /// P^T R^T f and J^T f.
+  void find_loads(std::span<const Index> nodes, std::span<const double> f, Eigen::Ref<Eigen::VectorXd> P_f,
+                  Eigen::Ref<Eigen::VectorXd> J_f) const noexcept {
+    P_f.setZero();
+    J_f.setZero();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
+      for_each_block(nodes[k], [&](Index node, double weight, const Vec3& gradient) {
+        add_forces(nodes[k], node, weight, gradient, force, P_f, J_f);
+      });
+      if (const Index c = column_of_[static_cast<std::size_t>(nodes[k])]; c >= 0) {
+        for (Eigen::Index axis = 0; axis < dimension(); ++axis)
+          J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
+      }
+    }
+  }
+
   /// K_c^-1 P^T R^T and H^-1 J^T of a node [n_q x d].
   struct Answer {
     Eigen::Map<Eigen::MatrixXd> by_rest, by_tangent;
@@ -215,6 +230,12 @@ class TwoLevelGreens final : public GreensOnTop {
 };
 
 }  // namespace
+
+TwoLevelState at_rest(std::shared_ptr<const CoarseNodes> nodes) {
+  TwoLevelState state{
+      .nodes = nodes, .turns = std::vector<CoarseTurn>(nodes->place.size()), .H_inverse = nodes->compliance};
+  return state;
+}
 
 std::shared_ptr<const Greens> two_levels(std::shared_ptr<const Greens> Xi, TwoLevelState state) {
   std::vector<Mat3> R;

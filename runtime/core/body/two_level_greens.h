@@ -21,6 +21,7 @@ struct CoarseNodes {
   std::vector<std::uint8_t> axes;  ///< [nodes] bit `axis` is set if the node is free along it
   Eigen::MatrixXd compliance;      ///< K_c^-1 of the coarse field at rest [m/N]
 
+  [[nodiscard]] Index dofs() const noexcept { return static_cast<Index>(field.dofs()); }  ///< n_q
   /// True if a node is free along every axis: others do not turn.
   [[nodiscard]] bool turns(Index node) const noexcept {
     return axes[static_cast<std::size_t>(node)] == (field.dimension() == 3 ? 7 : 3);
@@ -50,6 +51,9 @@ struct TwoLevelState {
   std::vector<Index>
       near{};  ///< nodes between which the coarse field's part is found now and not by each `gather`
 };
+
+/// The state of a body at rest, where they are Xi.
+[[nodiscard]] TwoLevelState at_rest(std::shared_ptr<const CoarseNodes> nodes);
 
 /// Makes it of Xi, which may be another one for each of several.
 std::shared_ptr<const Greens> two_levels(std::shared_ptr<const Greens> Xi, TwoLevelState state);

@@ -76,11 +76,11 @@ struct ComplianceChange {
       : range(static_cast<std::size_t>(nodes)),
         before(static_cast<std::size_t>(body.dimension()) * range.size()),
         after(before.size()),
-        of_all(static_cast<std::size_t>(body.greens().order())) {}
+        of_all(static_cast<std::size_t>(body.motion_size())) {}
 
   std::vector<NodeRange> range;       ///< nodes that near nodes follow, one each
   std::vector<double> before, after;  ///< their displacement by the forces, d each [m]
-  std::vector<double> of_all;         ///< [n] what the change takes from the displacement by forces [m]
+  std::vector<double> of_all;         ///< [n + n_q] what the change takes from the displacement by forces [m]
 };
 
 /// Deformed surface, kept from tick to tick. Each member: shape, stages that change it.

@@ -41,7 +41,7 @@ export function light_title(light: Light, change: NonNullable<State['change']>, 
 }
 
 /** The light beside the contacts, and what it means where it is not green; `beside` is what turned_beside has. */
-export function show_light({ change: all, model, settings }: State, beside: number): void {
+export function show_light({ change: all, model }: State, beside: number): void {
   const change = all ? { ...all, rotation: Math.min(all.rotation, beside) } : all;
   const of_body = light_of(change, model.studied_rotation);
   const light = of_body === 'good' && light_of(all, model.studied_rotation) !== 'good' ? null : of_body; // nothing is known of a steep dent
@@ -51,7 +51,7 @@ export function show_light({ change: all, model, settings }: State, beside: numb
   if (light === null || !change || !model.studied_rotation) return;
   shown.dataset.light = light;
   write(shown, `● turned ${(degrees * change.rotation).toFixed(0)}°`);
-  write(part('range-note'), light_title(light, change, model.studied_rotation, settings.depth === 'yes'));
-  shown.title = light_title(light, change, model.studied_rotation, settings.depth === 'yes');
+  write(part('range-note'), light_title(light, change, model.studied_rotation, model.deep === true));
+  shown.title = light_title(light, change, model.studied_rotation, model.deep === true);
   shown.ariaLabel = `${light === 'good' ? 'within' : light === 'near' ? 'near the end of' : 'beyond'} what was studied: ${shown.title}`;
 }

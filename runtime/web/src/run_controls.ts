@@ -49,7 +49,7 @@ export class RunControls {
     this.on_number('stiffness-scale', 'stiffness-scale', 1e-9);
     select('contact').addEventListener('change', () => this.change('contact', select('contact').value));
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).addEventListener('change', () => this.change_overlay(id));
-    input('two-levels').addEventListener('change', () => this.change('depth', input('two-levels').checked ? 'yes' : null));
+    input('two-levels').addEventListener('change', () => this.change('depth', !input('two-levels').checked ? 'no' : this.state_?.model.goes_deep ? null : 'yes'));
   }
 
   toggle_pause(): void {
@@ -153,18 +153,19 @@ export class RunControls {
   }
 
   /** A body on two levels has no inertia and no patches. */
-  private show_depth({ settings }: State): void {
-    const is_deep = settings.depth === 'yes';
+  private show_depth({ settings, model }: State): void {
+    const is_deep = model.deep === true;
     const in_the_way = settings.overlay !== undefined ? 'overlay' : settings.contact === 'dynamic' ? 'dynamic contact' : '';
     const depth = input('two-levels');
     depth.checked = is_deep;
     depth.disabled = !is_deep && in_the_way !== '';
     depth.title = depth.disabled ? `Not with ${in_the_way}: turn that off first` : 'The body turns and bends far, by a coarse body of large strain';
-    input('overlay').title = is_deep ? 'Not with depth' : 'A finer mesh under the tool';
-    if (!is_deep) return;
+    const is_asked = settings.depth === 'yes';
+    input('overlay').title = is_asked ? 'Not with depth' : 'A finer mesh under the tool';
+    if (is_deep) select('contact').title = 'With depth the body has no inertia';
+    if (!is_asked) return;
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = true;
     part('overlay-note').hidden = true;
-    select('contact').title = 'With depth the body has no inertia';
   }
 
   /** No more is offered than the file has layers for. */

@@ -25,6 +25,8 @@ export interface Model {
   size: number;
   bounds: [Vec3, Vec3];
   moves: boolean;
+  deep?: boolean; // on two levels: it turns and bends far
+  goes_deep?: boolean; // it is unless the settings say otherwise
   loads: boolean;
   overlay_rings?: number; // the most that an overlay may have; 0: none may be
   overlay_refinement?: [number, number]; // least and most

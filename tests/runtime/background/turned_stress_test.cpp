@@ -10,7 +10,7 @@
 
 #include "runtime/background/element_stress.h"
 #include "runtime/background/surface_stress.h"
-#include "runtime/depth/deep_model.h"
+#include "runtime/depth/deep_body.h"
 #include "tests/support/bodies/bent_bodies.h"
 
 namespace palpate::turned_stress_test {
@@ -30,7 +30,7 @@ class TurnedStress : public testing::TestWithParam<ElementType> {
   TurnedStress()
       : model(test::bent_model(GetParam())),
         still(model),
-        turning(deep_model(model), {}, 1, ContactModel::two_level),
+        turning(deep_body(model)),
         at(still.surface_in_mesh()),
         turn(Eigen::AngleAxisd(100.0 * degree,
                                model.dimension() == 2 ? Vec3(0, 0, 1) : Vec3(Vec3(1, 2, -2) / 3.0))) {}
@@ -90,7 +90,7 @@ TEST_P(TurnedStress, TurnsWithTheBody) {
 TEST(BentStress, IsThatOfTheEdgesStretchAndOfTheCorotationalBody) {
   Model model = test::bent_model(ElementType::quad4);
   ASSERT_EQ(model.analysis, Analysis::plane_stress);
-  const Body body(deep_model(model), {}, 1, ContactModel::two_level);
+  const Body body = deep_body(model);
   const std::vector<Vec3> at = body.surface_in_mesh(), none(at.size(), Vec3::Zero());
   const test::BendingLaw truth = test::corotational(model), deep = test::on_two_levels(body);
   const test::EndFace face(model.mesh);

@@ -1,15 +1,19 @@
 // Bodies on two levels under the tick.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <thread>
 
+#include "base/error.h"
 #include "runtime/background/motion_source.h"
+#include "runtime/background/surface_frames.h"
 #include "runtime/background/two_level_motion.h"
 #include "runtime/core/tick/step.h"
 #include "runtime/core/tick/surface_motion.h"
-#include "runtime/depth/deep_model.h"
+#include "runtime/depth/deep_body.h"
 #include "tests/support/bodies/bent_bodies.h"
 #include "tests/support/live_session.h"
 
@@ -67,7 +71,7 @@ Played play(const Body& body, double angle, int ticks, int wait) {
 // The force on the tool and the surface are those of a corotational body, bent by the same ball.
 TEST(TwoLevelTick, FeelsLikeTheCorotationalBody) {
   const Model model = test::bent_model(ElementType::quad4);
-  const Body deep(deep_model(model), {}, 1, ContactModel::two_level), linear{Model(model)};
+  const Body deep = deep_body(model), linear{Model(model)};
   const Body live = test::live_session(model, {.solver = LiveLaw::corotational, .mass_damping = 20.0});
   for (const double angle : {10.0, 45.0, 80.0, 120.0}) {
     const Played by_levels = play(deep, angle * degree, 2000, 500),
@@ -90,7 +94,7 @@ TEST(TwoLevelTick, FeelsLikeTheCorotationalBody) {
 
 TEST(TwoLevelTick, TwoRunsAreEqual) {
   const Model model = test::bent_model(ElementType::quad4);
-  const Body body(deep_model(model), {}, 1, ContactModel::two_level);
+  const Body body = deep_body(model);
   const Played one = play(body, 60.0 * degree, 300, 50), other = play(body, 60.0 * degree, 300, 50);
   EXPECT_EQ(one.force, other.force);
   EXPECT_EQ(one.largest_jump, other.largest_jump);
@@ -98,7 +102,7 @@ TEST(TwoLevelTick, TwoRunsAreEqual) {
 
 // Beside a ball that bends a tongue fast, the surface is where its displacement puts it.
 TEST(TwoLevelTick, TheSurfaceBesideATouchIsWhereTheBodyIs) {
-  const Body body(deep_model(test::bent_model(ElementType::hex8)), {}, 1, ContactModel::two_level, true);
+  const Body body = deep_body(test::bent_model(ElementType::hex8), 1, true);
   ASSERT_NE(body.local(), nullptr);
   State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
   MotionSource source(body, state, MotionSourceOptions{.in_background = false});
@@ -141,6 +145,90 @@ TEST(TwoLevelTick, TheSurfaceBesideATouchIsWhereTheBodyIs) {
   std::printf("%d places, off by %.2g edges at most\n", looked_at, farthest / body.mean_surface_edge());
   EXPECT_GT(looked_at, 100);
   EXPECT_LT(farthest, 0.1 * body.mean_surface_edge());
+}
+
+// A tick that ran while two steps ended would pass over the first one's sample, which a replay could not
+// know.
+TEST(TwoLevelTick, EachSampleIsReceived) {
+  const Body body = deep_body(test::bent_model(ElementType::hex8));
+  State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
+  MotionSource source(body, state, {});
+  const auto tick_until_job = [&](std::int64_t step_number, bool receives) {
+    while (state.surface.motion.job().step < step_number) {
+      if (receives) source.receive(state);
+      step(body, state, {.position = on_arc(0.0)});
+      source.post(state);
+    }
+  };
+  const auto wait_for_steps = [&](std::int64_t count) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (source.steps() < count && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    return source.steps() >= count;
+  };
+  tick_until_job(1, true);
+  ASSERT_TRUE(wait_for_steps(1));
+  tick_until_job(2, false);  // as if the sample had come just before the job was posted
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(source.steps(), 1);
+  tick_until_job(3, true);
+  EXPECT_EQ(state.surface.motion.sample_step(), 1);
+  ASSERT_TRUE(wait_for_steps(2));
+  source.receive(state);
+  EXPECT_EQ(state.surface.motion.sample_step(), 3);
+}
+
+/// Largest difference of two fields, in terms of the largest value of the second one.
+double difference(const std::vector<float>& a, const std::vector<float>& b) {
+  double most = 0.0, largest = 0.0;
+  EXPECT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < b.size(); ++k) {
+    if (std::isnan(b[k])) continue;
+    largest = std::max(largest, static_cast<double>(std::abs(b[k])));
+    most = std::max(most, static_cast<double>(std::abs(a[k] - b[k])));
+  }
+  return most / std::max(largest, 1e-30);
+}
+
+// A recording keeps the contact forces and the coarse field: pictures follow from them.
+TEST(TwoLevelTick, PicturesFollowFromForcesAndTheCoarseField) {
+  for (const bool local : {false, true}) {
+    const Body body = deep_body(test::bent_model(ElementType::hex8), local ? 2 : 1, local);
+    ASSERT_TRUE(pictures_follow_from_contacts(body));
+    State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
+    MotionSource source(body, state, MotionSourceOptions{.in_background = false});
+    ContactLoads loads;
+    SurfaceFrame frame;
+    SurfaceFrames in_short(body, state, {.ticks_per_frame = 1, .in_background = false, .contacts_only = true},
+                           [&](SurfacePicture picture) { loads = std::move(picture.loads); });
+    SurfaceFrames whole(body, state, {.ticks_per_frame = 1, .in_background = false},
+                        [&](SurfacePicture picture) { frame = std::move(picture.frame); });
+    PictureMaker maker(body);
+    constexpr int ticks = 400, wait = 200;
+    double moving = 0.0, resting = 0.0, stress = 0.0;
+    for (int k = 0; k <= ticks + wait; ++k) {
+      source.receive(state);
+      const Vec3 arc = on_arc(60.0 * degree * std::min(k, ticks) / ticks);
+      step(body, state,
+           {.position = Vec3(arc.x(), 0.5 * test::bent_height, arc.y() + 0.5 * test::bent_height)});
+      source.post(state);
+      if (k % 25 != 0 || k == 0) continue;
+      in_short.post(state, k, 1e-3 * k);
+      whole.post(state, k, 1e-3 * k);
+      keep_recorded(body, frame);
+      const SurfaceFrame later = maker.picture(loads);
+      const double off = difference(later.displacement, frame.displacement);
+      if (k < ticks) moving = std::max(moving, off);
+      if (k < ticks + wait) continue;
+      resting = off;
+      stress = difference(later.von_mises, frame.von_mises);
+    }
+    std::printf("off by %.2g while it moves, %.2g at rest; stress there by %.2g\n", moving, resting, stress);
+    EXPECT_LT(moving, 0.03);  // of second order in what a step moves
+    EXPECT_LT(resting, 1e-3);
+    EXPECT_LT(stress, 1e-2);
+    loads.field.pop_back();
+    EXPECT_THROW(static_cast<void>(maker.picture(loads)), Error);
+  }
 }
 
 }  // namespace

@@ -331,7 +331,7 @@ TEST(GalleryScene, OfARecordingIsAsItWasPressedMost) {
   const ScratchFolder folder;
   const std::filesystem::path model = folder.path() / "cube2.palpate.hdf";
   std::filesystem::copy_file(test::source_file("tests/golden/cube2/cube2.palpate.hdf"), model);
-  const Body body = load_body(model, "", {});
+  const Body body = load_body(model, "", {.depth = Depth::no});
   const RecordedSurface surface = recorded_surface(body);
   const Index node = body.surface_node_of_stored(body.free_surface_nodes().front());
   const auto pressed = [&](std::int64_t tick, float force) {
@@ -343,7 +343,8 @@ TEST(GalleryScene, OfARecordingIsAsItWasPressedMost) {
   };
   const std::filesystem::path file = folder.path() / "a.mcap";
   RecordingWriter writer(
-      file, {model.string(), body.model().content_hash, "script", 1000, "tool=sphere:0.1\noverlay=no\n"},
+      file,
+      {model.string(), body.model().content_hash, "script", 1000, "tool=sphere:0.1\noverlay=no\ndepth=no\n"},
       surface);
   for (const std::int64_t tick : {0, 1, 2}) {
     const float force = tick == 1 ? 0.02F : 0.01F;

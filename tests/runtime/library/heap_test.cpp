@@ -27,7 +27,7 @@
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/core/tick/step.h"
-#include "runtime/depth/deep_model.h"
+#include "runtime/depth/deep_body.h"
 #include "runtime/library/palpate.h"
 #include "tests/support/bodies/bent_bodies.h"
 #include "tests/support/bodies/runtime_model.h"
@@ -481,8 +481,7 @@ TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
 
 TEST(TwoLevelTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
   for (const int refinement : {1, 2}) {
-    const Body body(deep_model(test::bent_model(ElementType::tet4)), {}, refinement, ContactModel::two_level,
-                    refinement > 1);
+    const Body body = deep_body(test::bent_model(ElementType::tet4), refinement, refinement > 1);
     EXPECT_EQ(body.local() != nullptr, refinement > 1);
     expect_no_heap_call(body, Vec3(0.07, 0.005, 0.017), -0.5 * Vec3::UnitZ());
   }
