@@ -54,30 +54,40 @@ DepthTelling TwoLevelMotion::telling() const {
   return telling_;
 }
 
-void TwoLevelMotion::take_load(const NodalLoad& load) {
+void TwoLevelMotion::take_load(const MotionJob& job) {
   const int d = body_.dimension();
-  nodes_.assign(load.nodes().begin(), load.nodes().end());
+  const std::span<const Index> loaded = job.load.nodes();
+  nodes_.assign(loaded.begin(), loaded.end());
   std::sort(nodes_.begin(), nodes_.end());
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
   f_.assign(static_cast<std::size_t>(d) * nodes_.size(), 0.0);
-  for (std::size_t k = 0; k < load.nodes().size(); ++k) {
+  places_.assign(f_.size(), 0.0);
+  if (nodes_.empty()) return;
+  std::vector<double> without(f_.size());
+  for (std::size_t k = 0; k < loaded.size(); ++k) {
     const auto at =
-        static_cast<Index>(std::lower_bound(nodes_.begin(), nodes_.end(), load.nodes()[k]) - nodes_.begin());
-    set_vector(f_, d, at, vector_at(f_, d, at) + vector_at(load.forces(), d, static_cast<Index>(k)));
+        static_cast<Index>(std::lower_bound(nodes_.begin(), nodes_.end(), loaded[k]) - nodes_.begin());
+    set_vector(f_, d, at, vector_at(f_, d, at) + vector_at(job.load.forces(), d, static_cast<Index>(k)));
+    set_vector(without, d, at, vector_at(job.without, d, static_cast<Index>(k)));
   }
   std::vector<NodeRange> ranges;
   for (const Index node : nodes_) ranges.push_back({node, node + 1});
-  places_.assign(f_.size(), 0.0);
-  if (nodes_.empty()) return;
   now().displacement(nodes_, f_, ranges, places_);
-  // A place far from where the last balance had the node is beyond what the tick's linear model knows.
+  // Places far from where the last balance had the nodes are beyond what the tick's linear model knows. All
+  // go the same share of the way: if each went as far as it may, the nodes would be torn apart.
   const double most = most_of_cell * parts_.nodes->field.edge();
+  std::vector<double> last;
+  double farthest = 0.0;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const auto at = static_cast<Index>(k);
-    const Vec3 last = vector_at(levels_.displacement(), d, nodes_[k]);
-    const Vec3 moved = vector_at(places_, d, at) + vector_at(without_, d, nodes_[k]) - last;
-    set_vector(places_, d, at, last + std::min(1.0, most / std::max(moved.norm(), 1e-300)) * moved);
+    const Vec3 from = vector_at(levels_.displacement(), d, nodes_[k]);
+    const Vec3 place = vector_at(places_, d, at) + vector_at(without, d, at);
+    for (int axis = 0; axis < d; ++axis) last.push_back(from[axis]);
+    set_vector(places_, d, at, place);
+    farthest = std::max(farthest, (place - from).norm());
   }
+  const double share = farthest > most ? most / farthest : 1.0;
+  for (std::size_t i = 0; i < last.size(); ++i) places_[i] = last[i] + share * (places_[i] - last[i]);
 }
 
 /// Goes on to the balance. Where it is not found, the last one holds; after some failures the search begins
@@ -101,7 +111,7 @@ TwoLevelReport TwoLevelMotion::find() {
 void TwoLevelMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
   std::swap(x_, x_before_);
   try {
-    take_load(job.load);
+    take_load(job);
     const TwoLevelReport report = find();
     const auto of_field = std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
     std::copy(levels_.field().begin(), levels_.field().end(), of_field);

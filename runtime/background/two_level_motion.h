@@ -43,7 +43,7 @@ class TwoLevelMotion final : public MotionStepper {
   [[nodiscard]] const Greens& now() const noexcept { return mesh_ != nullptr ? *mesh_ : body_.greens(); }
   /// u [n + n_q] by the forces of the last balance.
   void find_by_load(const Greens& W, std::vector<double>& u) const;
-  void take_load(const NodalLoad& load);
+  void take_load(const MotionJob& job);
   TwoLevelReport find();
   [[nodiscard]] bool must_renew() const;
   [[nodiscard]] std::vector<Index> near_nodes() const;

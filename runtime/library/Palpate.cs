@@ -106,6 +106,7 @@ namespace Palpate
         public bool DynamicContact;
         public double Tick = 0.001;
         public long StressTicks;
+        public bool Depth;
     }
 
     /// <summary>What a tool feels since the last tick.</summary>
@@ -153,6 +154,7 @@ namespace Palpate
                 dynamicContact = options.DynamicContact ? 1 : 0,
                 tick = options.Tick,
                 stressTicks = options.StressTicks,
+                depth = options.Depth ? 1 : 0,
             };
             var overlay = GCHandle.Alloc(options.Overlay.GetValueOrDefault(), GCHandleType.Pinned);
             try
@@ -327,6 +329,7 @@ namespace Palpate
             internal int dynamicContact;
             internal double tick;
             internal long stressTicks;
+            internal int depth;
         }
 
         [StructLayout(LayoutKind.Sequential)]

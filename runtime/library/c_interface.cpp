@@ -143,6 +143,14 @@ palpate_overlay read_overlay(const palpate_overlay* given) {
   return overlay;
 }
 
+ContactModel read_contact(const palpate_options& options, const palpate_overlay& overlay) {
+  if (options.depth == 0)
+    return options.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+  if (options.dynamic_contact == 0 && overlay.refinement <= 1) return ContactModel::two_level;
+  throw Error("a body that turns and bends far has no inertia and no finer mesh", "options.depth",
+              "set it to 0, or leave out dynamic_contact and the overlay");
+}
+
 std::int64_t read_stress_ticks(std::int64_t ticks) {
   if (ticks >= 0) return ticks;
   throw Error("stress was asked for each " + std::to_string(ticks) + " ticks", "palpate_create_with_options",
@@ -165,7 +173,7 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
   settings.tool = tool;
   settings.reach = std::max(tool.reach, std::numeric_limits<double>::min());  // 0 is not allowed there
   settings.max_contacts = options.max_contacts;
-  settings.contact = contact;
+  settings.contact = contact == ContactModel::dynamic ? contact : ContactModel::quasi_static;
   settings.overlay = overlay.refinement > 1 ? OverlayOptions{.kind = OverlayKind::uniform,
                                                              .refinement = overlay.refinement,
                                                              .rings = overlay.rings}
@@ -173,7 +181,7 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
                          ? OverlayOptions{}
                          : OverlayOptions{.kind = OverlayKind::none};
   settings.overlay_memory = overlay.memory;
-  settings.depth = Depth::no;
+  settings.depth = contact == ContactModel::two_level ? Depth::yes : Depth::no;
   settings.rate = whole_rate(options.tick);
   return settings;
 }
@@ -242,8 +250,7 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
                  const palpate_overlay overlay = read_overlay(wanted.overlay);
                  StateOptions state = read_tools(tools, tool_count, max_contacts);
                  state.tick = wanted.tick;
-                 const ContactModel contact =
-                     wanted.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+                 const ContactModel contact = read_contact(wanted, overlay);
                  const std::int64_t stress_ticks = read_stress_ticks(wanted.stress_ticks);
                  code = PALPATE_ERROR_FILE;
                  Model model = load_model(file);

@@ -18,6 +18,7 @@
 #include "runtime/body/met_surface.h"
 #include "runtime/core/tick/state.h"
 #include "runtime/core/touch/tool_geometry.h"
+#include "runtime/depth/deep_body.h"
 #include "runtime/library/guarded.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/session_recording.h"
@@ -50,11 +51,13 @@ inline StateOptions with_room(StateOptions options, const Body& body, const palp
 /// tool.
 inline Body make_body(Model model, const StateOptions& options, const palpate_overlay& overlay,
                       ContactModel contact) {
-  if (overlay.refinement > 0) return Body(std::move(model), {}, overlay.refinement, contact);
+  const bool is_deep = contact == ContactModel::two_level;
+  if (overlay.refinement > 0 && !is_deep) return Body(std::move(model), {}, overlay.refinement, contact);
   double radius = std::numeric_limits<double>::infinity();
   for (const Tool& tool : options.tools) radius = std::min(radius, has_point_core(tool) ? tool.radius : 0.0);
-  const bool is_static = contact == ContactModel::quasi_static && is_even(model);
+  const bool is_static = contact != ContactModel::dynamic && overlay.refinement == 0 && is_even(model);
   const MetSurface met = is_static && radius > 0.0 ? met_surface(model, radius) : MetSurface{};
+  if (is_deep) return deep_body(std::move(model), met.refinement, met.is_local);
   return Body(std::move(model), {}, met.refinement, contact, met.is_local);
 }
 

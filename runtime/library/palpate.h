@@ -149,14 +149,16 @@ typedef struct palpate_options {
   double tick;          /* time between two calls of palpate_step, for bodies with dynamics [s] */
   int64_t stress_ticks; /* ticks between two computations of surface stress and pressure, by a thread of the
                          * session, for palpate_surface_stress; 0: never */
+  int depth;            /* not 0: the body turns and bends far, as by palpate-runtime play --depth yes;
+                         * not with dynamic contact or a finer mesh */
 } palpate_options;
 
-/* Default options: no overlay, quasi-static contact, ticks of 0.001 s, no stress. */
+/* Default options: no overlay, quasi-static contact, ticks of 0.001 s, no stress, small strain. */
 #define PALPATE_OPTIONS_INIT \
-  { sizeof(palpate_options), NULL, 0, 0.001, 0 }
+  { sizeof(palpate_options), NULL, 0, 0.001, 0, 0 }
 
-/* Does the same as palpate_create, with options. The motion of a body whose file has packed dynamics is
- * computed by threads of the session. */
+/* Does the same as palpate_create, with options. The motion of a body whose file has packed dynamics, or that
+ * turns and bends far, is computed by threads of the session. */
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
                                              int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) PALPATE_NOEXCEPT;

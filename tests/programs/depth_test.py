@@ -2,12 +2,13 @@
 
 import json
 import math
+import time
 import unittest
 from pathlib import Path
 
 import numpy
 
-from programs import MODELS, RUNTIME, ProgramTest, palpate, run
+from programs import MODELS, PATIENCE, RUNTIME, ProgramTest, palpate, run
 
 LENGTH, HEIGHT, RADIUS = 0.08, 0.01, 0.003
 TONGUE = """name = "tongue"
@@ -103,6 +104,8 @@ class Depth(ProgramTest):
 
         file = self.bake(TONGUE)
         same(file, "yes")
+        file.unlink()
+        file = self.bake(TONGUE.replace('scope = "surface"', 'scope = "layers"\nlayers = 1'))
         same(file, "no", "--overlay", "r=2,rings=1")
         file.unlink()
         same(self.bake(TONGUE + '[dynamics]\nmethod = "modal"\nmodes = 4\n'), "no")
@@ -118,6 +121,27 @@ class Depth(ProgramTest):
         result = run(RUNTIME, "play", file, "--device", "replay:keep.mcap", "--fast", "--report", "-", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(json.loads(result.stdout)["replay"]["different_ticks"], 0)
+
+    def test_an_own_loop_feels_it_and_replays(self):
+        file = self.bake(TONGUE)
+        deep, _, _ = self.play(file, 40, "--overlay", "no", seconds=0.3)
+        path = palpate.read(self.folder / "bend.mcap")["device_position"]
+        with palpate.Session(file, palpate.Tool(radius=RADIUS), max_contacts=256, depth=True) as session:
+            session.record(self.folder / "own.mcap")
+            for place in path:
+                force = session.step(place).force
+                time.sleep(0.0005)  # its balance is found by another thread
+            end = time.monotonic() + PATIENCE
+            while abs(numpy.linalg.norm(force) / deep[-1] - 1) > 1e-3 and time.monotonic() < end:
+                force = session.step(path[-1]).force
+                time.sleep(0.001)
+            session.end_recording()
+        self.assertAlmostEqual(numpy.linalg.norm(force) / deep[-1], 1, delta=1e-3)
+        result = run(RUNTIME, "play", file, "--device", "replay:own.mcap", "--fast", "--report", "-", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads(result.stdout)["replay"]["different_ticks"], 0)
+        with self.assertRaisesRegex(palpate.Error, "no inertia and no finer mesh"):
+            palpate.Session(file, palpate.Tool(radius=RADIUS), depth=True, overlay=palpate.Overlay(refinement=2, rings=1))
 
     def test_what_does_not_go_with_it_is_refused(self):
         file = self.bake(TONGUE)

@@ -12,6 +12,8 @@
 namespace palpate {
 namespace {
 
+constexpr std::int64_t most_steps_late = 8;  // over which a late sample's motion is spread
+
 /// Ticks per step of the file's dynamics.
 std::int64_t count_ticks(const ElasticBody& body, double tick) {
   if (!body.swings()) return 1;
@@ -135,11 +137,14 @@ FreeMotion::FreeMotion(const ElasticBody& body, double tick, Index most_loads)
       ticks_per_step_(count_ticks(body, tick)),
       decay_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
       dynamic_contact_(body.contact_model() != ContactModel::quasi_static),
+      is_on_two_levels_(body.contact_model() == ContactModel::two_level),
       active_(body.contact_model() == ContactModel::live || body.contact_model() == ContactModel::two_level),
       phase_(ticks_per_step_),
       history_{.loads{}, .strains{}, .pending = make_let_go(dimension_, room(body, most_loads))},
       sampled_{.job{.release = make_let_go(dimension_, room(body, most_loads)),
-                    .load = NodalLoad(dimension_, room(body, most_loads))},
+                    .load = NodalLoad(dimension_, room(body, most_loads)),
+                    .without = std::vector<double>(
+                        size_if(is_on_two_levels_, std::int64_t{dimension_} * most_loads))},
                .before{},
                .u{},
                .untouched{}} {
@@ -182,8 +187,8 @@ void FreeMotion::begin_tick(const ElasticBody& body) noexcept {
       for (std::size_t i = 0; i < sampled_.u.size(); ++i)
         sampled_.most_change = std::max(sampled_.most_change, std::abs(sampled_.u[i] - sampled_.before[i]));
     }
-    sampled_.share = std::min(1.0, static_cast<double>(phase_ - sampled_.phase) /
-                                       static_cast<double>(ticks_per_step_ - sampled_.phase));
+    sampled_.share =
+        std::min(1.0, static_cast<double>(ticks_ - sampled_.begun) / static_cast<double>(sampled_.length));
   }
 }
 
@@ -292,6 +297,9 @@ void FreeMotion::end_tick(const ElasticBody& body, const SurfaceLoad& load) noex
   sampled_.job.left = stills ? decay_ : 1.0;
   sampled_.job.load.clear();
   if (dynamic_contact_) sampled_.job.load.add(now.nodes(), now.forces(), 1.0);
+  for (std::size_t k = 0; is_on_two_levels_ && k < sampled_.job.load.nodes().size(); ++k)
+    set_vector(sampled_.job.without, dimension_, static_cast<Index>(k),
+               displacement(body, sampled_.job.load.nodes()[k]));
   if (history_.pending.force.empty() || sampled_.held_in_flight) return;
   std::swap(sampled_.job.release, history_.pending);
   clear(history_.pending);
@@ -391,7 +399,12 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
     sampled_.held_in_flight = false;
   }
   sampled_.step = sample.step;
-  sampled_.phase = phase_ % ticks_per_step_;
+  // A step that has a time of its own ends with it. Others, however late, move the surface no faster than
+  // they come.
+  sampled_.length = is_on_two_levels_ ? std::clamp(ticks_ - sampled_.begun, ticks_per_step_,
+                                                   most_steps_late * ticks_per_step_)
+                                      : ticks_per_step_ - phase_ % ticks_per_step_;
+  sampled_.begun = ticks_;
   sampled_.share = 0.0;
   sampled_.most_change = -1.0;
   return true;

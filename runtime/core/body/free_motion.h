@@ -34,7 +34,9 @@ struct MotionJob {
   std::int64_t seen = 0;    ///< step of the last sample received
   LetGo release;            ///< last release
   NodalLoad load;           ///< dynamic contact: forces at the end of the step
-  double left = 1.0;        ///< quasi-static contact: factor on the motion
+  /// On two levels: displacement of the load's nodes then without these forces, d each [m].
+  std::vector<double> without{};
+  double left = 1.0;  ///< quasi-static contact: factor on the motion
 };
 
 /// Result of a step.
@@ -172,7 +174,8 @@ class FreeMotion {
     MotionJob job;
     std::int64_t step = 0;          // of the last sample
     bool held_in_flight = false;    // what is held stays until a sample has it
-    std::int64_t phase = 0;         // in which the sample came
+    std::int64_t begun = 0;         // tick after which the sample came
+    std::int64_t length = 1;        // ticks until it is reached
     std::vector<double> before, u;  // [n] samples between which the tick lies
     double share = 1.0;             // of u
     double last_share = 1.0;        // in the last tick
@@ -190,6 +193,7 @@ class FreeMotion {
   std::int64_t ticks_per_step_ = 1;
   double decay_;  // factor of quasi-static contact on the motion, per step
   bool dynamic_contact_;
+  bool is_on_two_levels_;
   bool active_;
   std::int64_t ticks_ = 0;
   std::int64_t phase_ = 1;  // tick within the present step, from 1; the last one ends it

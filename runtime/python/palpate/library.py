@@ -67,7 +67,7 @@ class COverlay(Structure):
 
 class COptions(Structure):
     _fields_ = [("size", c_size_t), ("overlay", POINTER(COverlay)), ("dynamic_contact", c_int), ("tick", c_double),
-                ("stress_ticks", c_int64)]
+                ("stress_ticks", c_int64), ("depth", c_int)]
 
 
 class CResult(Structure):

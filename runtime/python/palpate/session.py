@@ -108,11 +108,12 @@ class Session:
     `file`: NAME.palpate.hdf; `tools`: one or several; `max_contacts`: room for contact points of all tools, 1 to 256;
     `overlay`: a finer mesh under the tools; `dynamic_contact`: the tools meet the body's inertia too (the file needs
     dynamics with a time step of one tick); `tick`: time from one step to the next [s]; `stress_ticks`: a thread finds
-    stress and pressure each so many ticks, for `stress`, 0 never. Throws Error."""
+    stress and pressure each so many ticks, for `stress`, 0 never; `depth`: the body turns and bends far, as by `play --depth
+    yes`. Throws Error."""
 
     def __init__(self, file: str | os.PathLike[str], tools: Tool | Sequence[Tool], *, max_contacts: int = 32,
                  overlay: Overlay | None = None, dynamic_contact: bool = False, tick: float = 0.001,
-                 stress_ticks: int = 0):
+                 stress_ticks: int = 0, depth: bool = False):
         self.tools = [tools] if isinstance(tools, Tool) else list(tools)
         self.tick = tick
         self._created = list(self.tools)
@@ -120,7 +121,7 @@ class Session:
         self._session = None
         c_tools = (CTool * len(self.tools))(*[c_tool(tool) for tool in self.tools])
         options = COptions(ctypes.sizeof(COptions), c_overlay(overlay), bool(dynamic_contact), tick,
-                           whole(stress_ticks, "stress_ticks", -(1 << 63), (1 << 63) - 1))
+                           whole(stress_ticks, "stress_ticks", -(1 << 63), (1 << 63) - 1), bool(depth))
         error = ctypes.create_string_buffer(4096)
         self._session = self._library.palpate_create_with_options(
             path_bytes(file), c_tools, len(self.tools), whole(max_contacts, "max_contacts"), ctypes.byref(options), error, len(error))

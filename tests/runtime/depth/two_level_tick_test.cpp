@@ -177,6 +177,64 @@ TEST(TwoLevelTick, EachSampleIsReceived) {
   EXPECT_EQ(state.surface.motion.sample_step(), 3);
 }
 
+/// Ticks as on a busy machine, where each step's sample comes `late` ticks after the step was asked for.
+class LatePlay {
+ public:
+  LatePlay(const Body& body, std::int64_t late)
+      : body_(body),
+        late_(late),
+        state_(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}}),
+        source_(body, state_, {}) {}
+
+  [[nodiscard]] const ToolState& tick(const Vec3& place) {
+    if (asked_ >= 0 && ticks_ - asked_ >= late_) {
+      while (source_.steps() == steps_) std::this_thread::yield();
+      steps_ = source_.steps();
+      source_.receive(state_);
+      asked_ = -1;
+    }
+    const std::int64_t before = state_.surface.motion.job().step;
+    step(body_, state_, {.position = place});
+    source_.post(state_);
+    if (asked_ < 0 && state_.surface.motion.job().step != before) asked_ = ticks_;
+    ++ticks_;
+    return state_.tools[0];
+  }
+
+ private:
+  const Body& body_;
+  std::int64_t late_, ticks_ = 0, asked_ = -1, steps_ = 0;
+  State state_;
+  MotionSource source_;
+};
+
+// A ball that bends a tongue faster than steps end, ten times over, is felt throughout, and ends as in time.
+TEST(TwoLevelTick, LateStepsLoseNoTool) {
+  const Body body = deep_body(test::bent_model(ElementType::hex8));
+  std::vector<double> force;
+  for (const int late : {0, 50, 100, 200}) {
+    LatePlay play(body, late);
+    constexpr int ticks = 300;
+    int lost = 0;
+    double jump = 0.0, last = 0.0;
+    for (int k = 0; k < ticks + 3000; ++k) {
+      const Vec3 arc = on_arc(40.0 * degree * std::min(k, ticks) / ticks);
+      const ToolState& tool =
+          play.tick(Vec3(arc.x(), 0.5 * test::bent_height, arc.y() + 0.5 * test::bent_height));
+      if (last > 0.0 && tool.contacts == 0) ++lost;
+      const double now = tool.wrench.force.norm();
+      jump = std::max(jump, std::abs(now - last));
+      last = now;
+    }
+    force.push_back(last);
+    std::printf("late by %d ticks: force %.5g N, %d ticks without contact, largest change %.2g N\n", late,
+                last, lost, jump);
+    EXPECT_EQ(lost, 0);
+    EXPECT_LT(jump, 0.02 * last);
+    EXPECT_NEAR(last / force.front(), 1.0, 1e-3);
+  }
+}
+
 /// Largest difference of two fields, in terms of the largest value of the second one.
 double difference(const std::vector<float>& a, const std::vector<float>& b) {
   double most = 0.0, largest = 0.0;
