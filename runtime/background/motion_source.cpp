@@ -81,7 +81,9 @@ void MotionSource::note_standing_still(State& state) noexcept {
 void MotionSource::post(State& state) noexcept {
   note_standing_still(state);
   const MotionJob& job = state.surface.motion.job();
-  if (!state.surface.motion.active() || job.step == posted_step_) return;
+  if (!state.surface.motion.active()) return;
+  const bool is_new = job.step != posted_step_;
+  if (!is_new && (!in_background_ || job.seen == posted_seen_)) return;
   if (in_background_) {
     jobs_.next() = job;
     jobs_.publish();
@@ -91,14 +93,14 @@ void MotionSource::post(State& state) noexcept {
     posted_.push_back(job);
   }
   posted_step_ = job.step;
+  posted_seen_ = job.seen;
 }
 
 void MotionSource::work() noexcept {
   int pauses = 0;
   while (!stop_) {
     const MotionJob& job = jobs_.read();
-    // A sample that the tick passes over would be missing in a replay: the next one waits for the job after
-    // it.
+    // A sample that the tick passes over would be missing in a replay.
     const bool is_unseen = job.step > done_ && job.seen != done_;
     if (job.step != done_ && !is_unseen) {
       do_job(job);

@@ -57,9 +57,10 @@ class MotionSource {
   Latest<MotionSample> samples_;
   std::deque<MotionJob> posted_;   // last jobs; not in the background
   std::int64_t posted_step_ = -1;  // of the last job posted
-  std::vector<Vec3> timely_;       // [tools] force when the body was last in time [N]
-  std::int64_t done_ = 0;          // last job done
-  std::int64_t let_go_done_ = 0;   // releases done
+  std::int64_t posted_seen_ = -1;
+  std::vector<Vec3> timely_;      // [tools] force when the body was last in time [N]
+  std::int64_t done_ = 0;         // last job done
+  std::int64_t let_go_done_ = 0;  // releases done
   std::atomic<std::int64_t> steps_ = 0;
   std::atomic<double> longest_ = 0.0;
   std::atomic<bool> stop_ = false;

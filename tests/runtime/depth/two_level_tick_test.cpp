@@ -150,31 +150,37 @@ TEST(TwoLevelTick, TheSurfaceBesideATouchIsWhereTheBodyIs) {
 // A tick that ran while two steps ended would pass over the first one's sample, which a replay could not
 // know.
 TEST(TwoLevelTick, EachSampleIsReceived) {
-  const Body body = deep_body(test::bent_model(ElementType::hex8));
-  State state(body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
-  MotionSource source(body, state, {});
-  const auto tick_until_job = [&](std::int64_t step_number, bool receives) {
-    while (state.surface.motion.job().step < step_number) {
+  const Model model = test::bent_model(ElementType::hex8);
+  const Body deep = deep_body(model),
+             live = test::live_session(model, {.solver = LiveLaw::corotational, .mass_damping = 20.0});
+  for (const Body* body : {&deep, &live}) {
+    State state(*body, {.tools = {Tool{.radius = radius, .reach = 0.01}}});
+    MotionSource source(*body, state, {});
+    const auto tick = [&](bool receives) {
       if (receives) source.receive(state);
-      step(body, state, {.position = on_arc(0.0)});
+      step(*body, state, {.position = on_arc(0.0)});
       source.post(state);
-    }
-  };
-  const auto wait_for_steps = [&](std::int64_t count) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (source.steps() < count && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-    return source.steps() >= count;
-  };
-  tick_until_job(1, true);
-  ASSERT_TRUE(wait_for_steps(1));
-  tick_until_job(2, false);  // as if the sample had come just before the job was posted
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  EXPECT_EQ(source.steps(), 1);
-  tick_until_job(3, true);
-  EXPECT_EQ(state.surface.motion.sample_step(), 1);
-  ASSERT_TRUE(wait_for_steps(2));
-  source.receive(state);
-  EXPECT_EQ(state.surface.motion.sample_step(), 3);
+    };
+    const auto tick_until_job = [&](std::int64_t number, bool receives) {
+      while (state.surface.motion.job().step < number) tick(receives);
+    };
+    const auto wait_for_steps = [&](std::int64_t count) {
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+      while (source.steps() < count && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+      return source.steps() >= count;
+    };
+    tick_until_job(1, true);
+    ASSERT_TRUE(wait_for_steps(1));
+    tick_until_job(2, false);  // as if the sample had come just before the job was posted
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    EXPECT_EQ(source.steps(), 1);
+    tick(true);
+    EXPECT_EQ(state.surface.motion.sample_step(), 1);
+    if (body == &deep) tick_until_job(3, true);  // the second job's forces are of the sample before
+    ASSERT_TRUE(wait_for_steps(2));
+    source.receive(state);
+    EXPECT_EQ(state.surface.motion.sample_step(), body == &deep ? 3 : 2);
+  }
 }
 
 /// Ticks as on a busy machine, where each step's sample comes `late` ticks after the step was asked for.
@@ -230,7 +236,7 @@ TEST(TwoLevelTick, LateStepsLoseNoTool) {
     std::printf("late by %d ticks: force %.5g N, %d ticks without contact, largest change %.2g N\n", late,
                 last, lost, jump);
     EXPECT_EQ(lost, 0);
-    EXPECT_LT(jump, 0.02 * last);
+    EXPECT_LT(jump, 0.015 * last);  // 0.013; 0.019 where the nodes are torn apart
     EXPECT_NEAR(last / force.front(), 1.0, 1e-3);
   }
 }
