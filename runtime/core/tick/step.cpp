@@ -45,9 +45,11 @@ bool is_still(const ToolState& tool) noexcept {
          tool.holding == tool.held_last_tick;
 }
 
-/// Counts the ticks in which nothing moves that could change a contact's force.
-void count_still_ticks(State& state) noexcept {
-  const bool still = !state.surface.motion.active() && state.surface.patch == state.surface.near.patch() &&
+/// Counts the ticks in which nothing moves that could change a contact's force. A body on two levels moves
+/// only towards its balance.
+void count_still_ticks(const ElasticBody& body, State& state) noexcept {
+  const bool swings = state.surface.motion.active() && body.contact_model() != ContactModel::two_level;
+  const bool still = !swings && state.surface.patch == state.surface.near.patch() &&
                      std::all_of(state.tools.begin(), state.tools.end(), is_still);
   state.still_ticks = still ? state.still_ticks + 1 : 0;
 }
@@ -102,7 +104,7 @@ StepStatus step(const ElasticBody& body, State& state, std::span<const ToolPose>
   follow_devices(body, state, scratch.detection, poses);
   scratch.last.remember(state.contacts());
   update_holds(body, state, scratch.last);
-  count_still_ticks(state);
+  count_still_ticks(body, state);
   const ContactOutcome contact = solve_contact(body, state, scratch);
   if (contact == ContactOutcome::solved) {
     note_surface_changes(body, state);
