@@ -86,6 +86,7 @@ struct ContactProblem {
   Index rows = 0;
   bool frictionless = true;        ///< no contact has friction
   bool single = false;             ///< W is single_W
+  double precision = 1.0;          ///< factor on the residuals that are accepted with friction
   bool moves = false;              ///< a device, the body or its overlay has moved in this tick
   std::vector<Index> first;        ///< [contacts + 1]
   std::vector<double> friction;    ///< [contacts] mu

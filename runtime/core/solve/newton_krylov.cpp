@@ -261,17 +261,20 @@ bool NewtonKrylov::iterate(ContactProblem& problem, std::span<const double> pred
   rounds_ = 0;
   find_residual();
   keep_best();
-  const double wanted =
-      std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, tuning.many.tolerance);
+  const double precision =
+      problem.frictionless ? 1.0 : problem.precision;  // what sticks slides by the residual
+  const double most = precision * tuning.many.tolerance;
+  const double wanted = std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, most);
   if (best_ > wanted) predict(prediction);
   Progress progress;
   // Rest is reached over several ticks, each starting from the last one: no step is too late for that.
-  const bool moves = problem.moves || wanted == tuning.many.tolerance;
+  const bool moves = problem.moves || wanted == most;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
     const double next = work_ + round_work(progress.has_step());
-    if (moves && best_ <= tuning.many.late_tolerance && next >= tuning.many.late_work) return true;
-    return best_ <= tuning.many.rough_tolerance &&
+    if (moves && best_ <= precision * tuning.many.late_tolerance && next >= tuning.many.late_work)
+      return true;
+    return best_ <= precision * tuning.many.rough_tolerance &&
            (work_ >= tuning.many.smooth_work || progress.failures >= tuning.many.rough_failures);
   };
   while (!is_done()) {

@@ -106,12 +106,14 @@ struct ManyTuning {
   double reduction = 0.1;   ///< [residual of the guess] target, at most `tolerance`, so that rest is reached
   double tolerance = 1e-4;  ///< [largest force] target of the residual
   double rough_tolerance = 3e-4;  ///< [largest force] accepted beyond `smooth_work` or `rough_failures`
-  double smooth_work = 3e6;       ///< multiplications
-  int rough_failures = 3;         ///< failed Newton steps
-  double late_tolerance = 1e-3;   ///< [largest force] accepted in motion if another round exceeds `late_work`
-  double late_work = 5e6;         ///< multiplications. Measured: spheres of 150 and 500 mm on the liver with
-                                  ///< edges of 3.6 mm, friction 0.2 (docs/decisions-contact.md)
-  double accepted = 3e-3;         ///< [largest force] accepted at the end of the budget
+  double deep_precision = 0.01;  ///< [tolerances] on two levels, where W is soft near an instability and what
+                                 ///< slides by the residual of each tick adds up
+  double smooth_work = 3e6;      ///< multiplications
+  int rough_failures = 3;        ///< failed Newton steps
+  double late_tolerance = 1e-3;  ///< [largest force] accepted in motion if another round exceeds `late_work`
+  double late_work = 5e6;        ///< multiplications. Measured: spheres of 150 and 500 mm on the liver with
+                                 ///< edges of 3.6 mm, friction 0.2 (docs/decisions-contact.md)
+  double accepted = 3e-3;        ///< [largest force] accepted at the end of the budget
   int most_rounds = 60;      ///< rounds of sweeps, each with a Newton step until these have failed. With 20 a
                              ///< sliding disc left 11 of 300 ticks unsolved, with 60 it leaves 2
   double most_work = 1.4e7;  ///< multiplications

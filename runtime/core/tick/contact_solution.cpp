@@ -223,6 +223,8 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
 
 ContactOutcome solve_contact(const ElasticBody& body, State& state, Scratch& scratch) noexcept {
   scratch.problem.moves = state.still_ticks == 0;
+  const bool is_deep = body.contact_model() == ContactModel::two_level;
+  scratch.problem.precision = is_deep ? tuning.many.deep_precision : 1.0;
   find_contacts(body, state, scratch, Pass::first);
   change_patch(body, state);
   bool rough = is_rough(body, state);

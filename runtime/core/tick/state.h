@@ -124,6 +124,7 @@ struct State {
   double tick;                   ///< time between ticks [s]
   std::int64_t ticks = 0;        ///< number of ticks so far
   std::int64_t still_ticks = 0;  ///< ticks since a device, the body itself or its overlay moved or changed
+  std::int64_t rest_ticks = 0;   ///< the same, but a body on two levels only moves towards its balance
   bool goes_half_way = false;    ///< the last tick made only half of its change of forces
   StepStatus status = StepStatus::ok;  ///< status of the last tick, for all tools
   std::vector<ToolState> tools;

@@ -45,18 +45,19 @@ bool is_still(const ToolState& tool) noexcept {
          tool.holding == tool.held_last_tick;
 }
 
-/// Counts the ticks in which nothing moves that could change a contact's force. A body on two levels moves
-/// only towards its balance.
+/// Counts the ticks in which nothing moves that could change a contact's force.
 void count_still_ticks(const ElasticBody& body, State& state) noexcept {
-  const bool swings = state.surface.motion.active() && body.contact_model() != ContactModel::two_level;
-  const bool still = !swings && state.surface.patch == state.surface.near.patch() &&
+  const bool rests = state.surface.patch == state.surface.near.patch() &&
                      std::all_of(state.tools.begin(), state.tools.end(), is_still);
-  state.still_ticks = still ? state.still_ticks + 1 : 0;
+  const bool is_moved = state.surface.motion.active(),
+             swings = is_moved && body.contact_model() != ContactModel::two_level;
+  state.still_ticks = rests && !is_moved ? state.still_ticks + 1 : 0;
+  state.rest_ticks = rests && !swings ? state.rest_ticks + 1 : 0;
 }
 
 /// Sets the status of tools whose contact has not come to rest although nothing has moved for long.
 void note_unsettled_tools(State& state) noexcept {
-  if (static_cast<double>(state.still_ticks) * state.tick < tuning.hand.patience) return;
+  if (static_cast<double>(state.rest_ticks) * state.tick < tuning.hand.patience) return;
   for (ToolState& tool : state.tools) {
     const Vec3& force = tool.contact_wrench.force;
     const double most = tuning.hand.settled_share * tool.recent_force;
