@@ -31,11 +31,11 @@ double velocity_share(double kinetic_energy, double bound) noexcept;
 struct MotionJob {
   std::int64_t step = 0;    ///< number of the step; a step is a whole number of ticks
   std::int64_t let_go = 0;  ///< number of releases up to this step
-  std::int64_t seen =
-      0;           ///< step of the last sample that the tick had, for a job on two levels at its forces
+  /// Step of the last sample received; on two levels of that under which the forces were found.
+  std::int64_t seen = 0;
   LetGo release;   ///< last release
   NodalLoad load;  ///< dynamic contact: forces at the end of the step
-  /// On two levels: displacement of the load's nodes then without these forces, d each [m].
+  /// On two levels: displacement of the load's nodes without these forces, d each [m].
   std::vector<double> without{};
   double left = 1.0;  ///< quasi-static contact: factor on the motion
 };

@@ -232,9 +232,8 @@ class TwoLevelGreens final : public GreensOnTop {
 }  // namespace
 
 TwoLevelState at_rest(std::shared_ptr<const CoarseNodes> nodes) {
-  TwoLevelState state{
+  return {
       .nodes = nodes, .turns = std::vector<CoarseTurn>(nodes->place.size()), .H_inverse = nodes->compliance};
-  return state;
 }
 
 std::shared_ptr<const Greens> two_levels(std::shared_ptr<const Greens> Xi, TwoLevelState state) {
