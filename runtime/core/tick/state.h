@@ -90,6 +90,7 @@ struct SurfaceState {
   FreeMotion motion;                        ///< [n] follow_free_motion and release
   std::vector<double> stored_displacement;  ///< [n] by contact forces, as of their last update [m]
   FarSweep sweep;                           ///< renew_far_surface and renew_patch_surface
+  double own_motion = 0.0;  ///< largest motion of a near node by the body itself in this tick [m]
   double unfollowed = 0.0;  ///< motion since follow_free_motion last moved nodes beside the near ones [m]
   ComplianceChange change;  ///< change_compliance
   std::shared_ptr<const Patch> patch;  ///< requested overlay, null for none; used from the next tick on

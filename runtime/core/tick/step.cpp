@@ -35,7 +35,7 @@ void begin_tick(State& state) noexcept {
 void follow_devices(const ElasticBody& body, State& state, DetectionScratch& detection,
                     std::span<const ToolPose> poses) noexcept {
   for (std::size_t k = 0; k < state.tools.size(); ++k)
-    follow_device(body, state.surface.tree, detection, state.tools[k], poses[k]);
+    follow_device(body, state.surface, detection, state.tools[k], poses[k]);
   state.surface.near.begin_tick();
 }
 

@@ -141,6 +141,16 @@ void renew_all_in_turn(const ElasticBody& body, SurfaceState& surface, std::span
   sweep.change = 0.0;
 }
 
+/// Largest change of a near node's displacement by the body's own motion in this tick [m].
+double near_motion(const ElasticBody& body, const SurfaceState& surface) noexcept {
+  double largest = 0.0;
+  for (Index place = 0; place < surface.near.count(); ++place) {
+    const Index node = surface.near.node(place);
+    if (body.aggregate_of(node) < 0) largest = std::max(largest, surface.motion.change(node).norm());
+  }
+  return largest;
+}
+
 }  // namespace
 
 void change_compliance(const ElasticBody& body, SurfaceState& surface,
@@ -192,10 +202,12 @@ void move_near_surface(const ElasticBody& body, SurfaceState& surface) noexcept 
 void follow_free_motion(const ElasticBody& body, State& state, DetectionScratch& detection) noexcept {
   SurfaceState& surface = state.surface;
   surface.motion.begin_tick(body);
+  surface.own_motion = 0.0;
   if (!surface.motion.active()) return;
   const bool is_behind = surface.motion.job().step > surface.motion.sample_step() + 1;  // by whole steps
   if (is_behind || surface.motion.is_late()) state.status |= StepStatus::late_motion;
   move_near_surface(body, surface);
+  surface.own_motion = near_motion(body, surface);
   surface.unfollowed += surface.motion.most_change();
   if (surface.unfollowed <= tuning.far.unfollowed * body.mean_surface_edge()) return;
   surface.unfollowed = 0.0;

@@ -48,8 +48,9 @@ bool has_gone_away(const ElasticBody& body, const ToolState& tool) noexcept {
 
 }  // namespace
 
-void follow_device(const ElasticBody& body, const SurfaceTree& tree, DetectionScratch& detection,
+void follow_device(const ElasticBody& body, const SurfaceState& surface, DetectionScratch& detection,
                    ToolState& tool, ToolPose wanted) noexcept {
+  const SurfaceTree& tree = surface.tree;
   tool.last_motion = tool.device.position - tool.last_device.position;
   tool.last_device = tool.device;
   if (!make_valid(wanted, body.dimension())) {
@@ -88,12 +89,10 @@ void follow_device(const ElasticBody& body, const SurfaceTree& tree, DetectionSc
     wanted = between(tool.device, wanted, most / wanted_motion);
   }
   tool.device = wanted;
-  tool.margin = least + 2.0 * std::min(wanted_motion,
-                                       tuning.following.most_motion * size);  // tool and surface may meet
-  if (tool.contacts == 0 && !tool.holding) {  // free: it was at the device's position
-    const double moved = motion(tool.tool, tool.pose, tool.device);
-    tool.margin = least + 2.0 * std::min(moved, tuning.following.most_motion * size);
-  }
+  const bool is_free = tool.contacts == 0 && !tool.holding;  // it was at the device's position
+  const double moved = is_free ? motion(tool.tool, tool.pose, tool.device) : wanted_motion;
+  // Tool and surface may meet, or move apart without their contact.
+  tool.margin = least + 2.0 * std::min(moved + surface.own_motion, tuning.following.most_motion * size);
 }
 
 void move_tools(const ElasticBody& body, State& state) noexcept {

@@ -8,7 +8,7 @@ namespace palpate {
 /// Sets the device's pose for this tick: the requested one, but no farther from the last one than contact can
 /// follow, or in free space as far as it is free. A tool that has not been clear of the body, or is lost in
 /// it, is placed there without being engaged.
-void follow_device(const ElasticBody& body, const SurfaceTree& tree, DetectionScratch& detection,
+void follow_device(const ElasticBody& body, const SurfaceState& surface, DetectionScratch& detection,
                    ToolState& tool, ToolPose wanted) noexcept;
 
 /// Moves the tools to where the couplings hold them under their contact wrenches.
