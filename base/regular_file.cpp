@@ -85,10 +85,15 @@ void check_regular_file(const std::filesystem::path& file, const char* if_missin
   const Descriptor closed_again(open_regular_file(file, O_RDONLY, if_missing));
 }
 
-std::string read_all(const std::filesystem::path& file, const char* if_missing) {
+std::string read_all(const std::filesystem::path& file, const char* if_missing, std::int64_t most) {
   const Descriptor descriptor(open_regular_file(file, O_RDONLY, if_missing));
   struct stat status = {};
   if (::fstat(descriptor.fd, &status) != 0) fail("read", file, errno, if_missing);
+  if (status.st_size > most) {
+    throw Error("the file has " + std::to_string(status.st_size) + " bytes, of " + std::to_string(most) +
+                    " that are read at most",
+                file.string(), if_missing);
+  }
   std::string text;
   text.reserve(static_cast<std::size_t>(status.st_size));
   std::vector<char> chunk(65536);  // not on the stack, which may be as small

@@ -1,6 +1,7 @@
 // Input files: opened without waiting, read whole.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -16,7 +17,12 @@ int open_regular_file(const std::filesystem::path& file, int flags,
 /// it does not exist.
 void check_regular_file(const std::filesystem::path& file, const char* if_missing = "Check the path");
 
-/// All bytes of a regular file. Throws Error as check_regular_file does.
-std::string read_all(const std::filesystem::path& file, const char* if_missing = "Check the path");
+inline constexpr std::int64_t largest_read = std::int64_t{8} << 30;          ///< [bytes] that is read whole
+inline constexpr std::int64_t largest_description = std::int64_t{64} << 20;  ///< [bytes] of a TOML file
+
+/// All bytes of a regular file. Throws Error as check_regular_file does, and if it has more than `most`
+/// bytes.
+std::string read_all(const std::filesystem::path& file, const char* if_missing = "Check the path",
+                     std::int64_t most = largest_read);
 
 }  // namespace palpate

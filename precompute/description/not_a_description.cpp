@@ -49,7 +49,8 @@ void check_is_description(const std::filesystem::path& path) {
                 "Write a model.toml beside it and give that to palpate-precompute, to begin with:\n" +
                     first_description(path, kind->geometry));
   if (kind == nullptr &&
-      read_all(path, "Give the path of a model.toml").find("[geometry]") == std::string::npos)
+      read_all(path, "Give the path of a model.toml", largest_description).find("[geometry]") ==
+          std::string::npos)
     throw Error(
         "is neither a description (.toml, with a table [geometry]) nor of a kind that is known", file,
         "give a surface (.stl, .obj, .ply, .off), a labelled image (.nrrd, .nii, .inr), a picture (.png, "

@@ -154,7 +154,7 @@ void refuse_files_under_other_keys(const toml::table& table, const TomlTable& ro
 }  // namespace
 
 Description read_description(const std::filesystem::path& path) {
-  return parse_description(read_all(path, "Give the path of a model.toml"), path);
+  return parse_description(read_all(path, "Give the path of a model.toml", largest_description), path);
 }
 
 Description parse_description(const std::string& text, const std::filesystem::path& path) {

@@ -99,7 +99,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
                const BodyOptions& options) {
   Model model = load_model(file);
   const char* const if_missing = "give the model.toml that the file should have been made from";
-  if (!model_toml.empty() && read_all(model_toml, if_missing) != model.model_toml) {
+  if (!model_toml.empty() && read_all(model_toml, if_missing, largest_description) != model.model_toml) {
     throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
                 file.string(), "precompute it again: palpate-precompute " + shell_word(model_toml.string()));
   }

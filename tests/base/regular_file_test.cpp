@@ -46,6 +46,17 @@ TEST(RegularFile, IsReadWhole) {
   EXPECT_EQ(read_all(folder.write("empty.toml", "")), "");
 }
 
+TEST(RegularFile, OfMoreBytesThanItsKindHasIsNotRead) {
+  const ScratchFolder folder;
+  const std::filesystem::path file = folder.write("a.toml", "abc");
+  EXPECT_EQ(read_all(file, "", 3), "abc");
+  std::filesystem::resize_file(file, std::uintmax_t{1} << 40);  // with holes
+  for (const std::int64_t most : {largest_description, largest_read}) {
+    const Error error = error_of([&] { read_all(file, "", most); });
+    EXPECT_TRUE(contains(error.what(), "1099511627776 bytes")) << error.what();
+  }
+}
+
 TEST(RegularFile, FifoIsRefusedWithoutWaitingForItsWriter) {
   const ScratchFolder folder;
   ASSERT_EQ(::mkfifo((folder.path() / "fifo").c_str(), 0666), 0);

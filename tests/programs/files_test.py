@@ -224,6 +224,10 @@ class CleanNames(FilesTest):
             self.assertIn(self.SHOWN, self.said(RUNTIME, *command, status=1), command)
         self.assertIn(self.SHOWN, self.said(RUNTIME, self.NAME + ".mcap", status=2))
 
+    def test_that_begin_with_a_dash(self):
+        self.write("-cut.off", "OFF\n8 12 0\n0 0 0\n")
+        self.assertIn("-cut.off:2", self.said(RUNTIME, "push", "--", "-cut.off", status=1))
+
     def test_that_are_not_utf_8(self):
         model = self.write("m.toml", cube_toml(2))
         body = b"\xff.palpate.hdf"

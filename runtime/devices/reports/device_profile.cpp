@@ -155,7 +155,7 @@ bool DeviceProfile::fits(const DeviceId& device) const noexcept {
 }
 
 DeviceProfile read_device_profile(const std::filesystem::path& file) {
-  return parse_device_profile(read_all(file), file.string());
+  return parse_device_profile(read_all(file, "Check the path", largest_description), file.string());
 }
 
 DeviceProfile parse_device_profile(std::string_view text, const std::string& name) {

@@ -416,5 +416,15 @@ TEST(TimeHistogram, GivesPercentilesOfWhatItCounted) {
   EXPECT_EQ(histogram.percentile(1.0), 0);
 }
 
+TEST(TimeHistogram, CountsMoreThanThirtyTwoBitsHold) {
+  TimeHistogram histogram;
+  histogram.add(700);
+  for (int k = 0; k < 33; ++k) histogram.add(TimeHistogram(histogram));
+  histogram.add(900);
+  EXPECT_EQ(histogram.total(), (std::int64_t{1} << 33) + 1);
+  EXPECT_EQ(histogram.total_between(700, 701), std::int64_t{1} << 33);
+  EXPECT_EQ(histogram.percentile(0.5), 700);
+}
+
 }  // namespace
 }  // namespace palpate::loop_test
