@@ -205,7 +205,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
       (order + typical_rank * static_cast<double>(plan.frame.far_pair.size() +
                                                   std::size_t(plan.frame.tree.clusters()))));
   const std::int64_t touched = std::int64_t{model.dimension()} * certified_nodes.back();
-  plan.memory_bytes = inverted_bytes(factor) +
+  plan.memory_bytes = solver_bytes(factor) +
                       jobs * (compression_workspace(factor, plan.frame) +
                               touch_matrices * touched * touched * std::int64_t{sizeof(double)}) +
                       thread_bytes(jobs) + plan.frame.bytes() + recompression_copies * plan.far_bytes +

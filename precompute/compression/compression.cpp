@@ -245,15 +245,16 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
 
 std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
   const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
-  return SelectedSolver(factor).workspace_bytes(
-      std::max(frame.dimension * leaf, static_cast<std::int64_t>(columns_at_once<double>)));
+  constexpr std::int64_t columns = columns_at_once<double>;
+  return SelectedSolver(factor).workspace_bytes(std::max(frame.dimension * leaf, columns)) +
+         frame.order() * columns * std::int64_t{sizeof(double)};
 }
 
-std::int64_t inverted_bytes(const Factor& factor) {
+std::int64_t solver_bytes(const Factor& factor) {
   const SupernodalTree tree(factor);
   std::int64_t entries = 0;
   for (const Supernode& s : tree.supernodes()) entries += s.columns * s.columns;
-  return entries * std::int64_t{sizeof(double)};
+  return entries * std::int64_t{sizeof(double)} + (factor.entries() + entries) * std::int64_t{sizeof(float)};
 }
 
 }  // namespace palpate

@@ -89,7 +89,8 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
 /// Memory of one thread [byte].
 std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame);
 
-/// Memory of the factor's diagonal blocks, inverted [byte].
-std::int64_t inverted_bytes(const Factor& factor);
+/// Memory of solvers beside the factor: its diagonal blocks inverted, and its copy in single precision
+/// [byte].
+std::int64_t solver_bytes(const Factor& factor);
 
 }  // namespace palpate

@@ -46,9 +46,8 @@ Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
   }
   Interpolation result;
   result.follow = Eigen::MatrixXd::Zero(rows, rank);
-  const Eigen::MatrixXd T = R.topLeftCorner(rank, rank)
-                                .triangularView<Eigen::Upper>()
-                                .solve(Eigen::MatrixXd(R.block(0, rank, rank, rows - rank)));
+  Eigen::MatrixXd T = R.block(0, rank, rank, rows - rank);
+  if (T.size() > 0) R.topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solveInPlace(T);
   for (Eigen::Index j = 0; j < rows; ++j) {
     if (j < rank) {
       result.skeleton.push_back(order[j]);

@@ -14,6 +14,8 @@
 namespace palpate {
 namespace {
 
+constexpr double rounding_strain = 1e-12;
+
 unsigned held_axes(const Model& model, Index mesh_node) {
   return model.fixed[mesh_node] & ((1U << model.dimension()) - 1U);
 }
@@ -101,7 +103,10 @@ SurfaceStress::SurfaceStress(const Body& body)
       in_patch_(body.model().mesh.elements()),
       on_patch_(position_.size()),
       weight_(position_.size()) {
-  for (const Material& material : body.model().materials) laws_.emplace_back(material, body.model().analysis);
+  for (const Material& material : body.model().materials) {
+    laws_.emplace_back(material, body.model().analysis);
+    rounding_ = std::min(rounding_, rounding_strain * material.youngs_modulus);
+  }
   number_facets();
   measure();
   find_traction_of_loads();
@@ -331,6 +336,8 @@ void SurfaceStress::evaluate(std::span<const Vec3> u, std::span<const Vec3> cont
   const bool turns = !turn_.empty();
   if (turns) {
     rows_.apply_turned(position_, body_.dimension() == 2, u, turn_, stress);
+    for (Stress& value : stress)  // or a body at rest would show what is left of its rotations
+      if (value.cwiseAbs().maxCoeff() < rounding_) value.setZero();
   } else {
     rows_.apply(u, stress);
   }

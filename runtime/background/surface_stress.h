@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -96,6 +97,7 @@ class SurfaceStress {
   std::vector<std::size_t> first_of_force_;      // [body's + 1] begin of each node's entries below
   std::vector<Index> row_of_force_;              // node whose stress it changes
   std::vector<StressBlock> by_force_;            // [1/m^2]
+  double rounding_ = std::numeric_limits<double>::infinity();  // [Pa] stress that is none, of what turns
   // Workspace.
   std::vector<Vec3> body_force_;        // [body's]
   std::vector<Mat3> turn_;              // [body's] rotations of their frames; empty for small strain

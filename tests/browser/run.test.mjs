@@ -46,15 +46,15 @@ test('pause, a tick at a time, reset', async (t) => {
 });
 
 test('settings are taken, refused with a reason, and felt', async (t) => {
-  const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 2\n' });
+  const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 2\n', args: ['--tool', 'point', '--overlay', 'no'] });
   await part(page, 'tool-kind').selectOption('sphere');
   await until(page, () => window.palpate.state.settings.tool?.startsWith('sphere:'));
   await part(page, 'radius').fill('100');
   await part(page, 'radius').press('Enter');
   await until(page, () => window.palpate.state.settings.tool === 'sphere:0.1');
   await choose(page, 'press', 0.02);
-  const push = async (is_refined) => {
-    const felt = await pressed(page, top, is_refined);
+  const push = async (firmer) => {
+    const felt = await pressed(page, top, firmer);
     await until(page, () => window.palpate.lastFrame.contacts === 0);
     return felt.force[2] / felt.depth;
   };
@@ -68,8 +68,8 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   await part(page, 'stiffness-scale').press('Enter');
   await until(page, () => window.palpate.state.settings['stiffness-scale'] === '1' && !window.palpate.state.busy);
   await part(page, 'overlay').click(); // it is checked once the runtime has taken it
-  await until(page, () => window.palpate.state.settings.overlay !== undefined && !window.palpate.state.busy);
-  const softer = await push(true);
+  await until(page, () => window.palpate.state.settings.overlay !== 'no' && !window.palpate.state.busy);
+  const softer = await push(once);
   assert.ok(Math.abs(softer) < 0.97 * Math.abs(once), `with an overlay ${softer}, without ${once}`);
   await part(page, 'friction').fill('-1');
   await part(page, 'friction').press('Enter');
@@ -116,7 +116,7 @@ test('a live body has settings of its own, which are taken and refused with a re
   assert.equal(await part(page, 'gravity').inputValue(), '0,0,-9.81');
   assert.equal(await part(page, 'yield').inputValue(), 'inf');
   const taken = async (name, value) => {
-    await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [key, value]);
+    await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [name, value]);
     await until(page, () => window.palpate.ready);
   };
   for (const [name, value] of Object.entries({ yield: '0.05', creep: '20', 'most-plastic': '0.5', 'live-step': '0.01', 'mass-damping': '2', 'stiffness-damping': '0.01', 'wall-friction': '0.25', gravity: '0,0,-5', 'poissons-ratio': '0.45' })) {

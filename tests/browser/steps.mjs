@@ -43,12 +43,22 @@ export async function settled(page) {
   return told(page, 'lastFrame');
 }
 
-/// Presses at a place of the body until it rests, with the overlay's mesh under the tool where one `is_refined`, and lifts: the frame before that.
-export async function pressed(page, place, is_refined = false) {
+/// Presses at a place of the body until it rests, and lifts: the frame before that. `firmer`: force over depth [N/m], by 3 % of which it is to be
+/// softer first (an overlay's mesh is made beside the ticks, which go on without it).
+export async function pressed(page, place, firmer = null) {
   const { x, y } = await project(page, place);
   await page.mouse.move(x, y);
   await page.mouse.down();
-  if (is_refined) await until(page, () => window.palpate.lastFrame.patch > 0); // it is made beside the ticks, which go on without it
+  if (firmer !== null) {
+    await until(
+      page,
+      (last) => {
+        const { contacts, force, depth } = window.palpate.lastFrame;
+        return contacts > 0 && Math.abs(force[2] / depth) < 0.97 * Math.abs(last);
+      },
+      firmer,
+    );
+  }
   const felt = await settled(page);
   await page.mouse.up();
   return felt;

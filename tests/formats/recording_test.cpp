@@ -799,9 +799,9 @@ TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
   const Folder folder;
   const std::filesystem::path path = folder / "a.mcap";
   record(path, 3, 3);
-  change_metadata(path, "5.0", "5.7");
+  change_metadata(path, "6.0", "6.7");
   EXPECT_EQ(RecordingFile(path).ticks(), 3);
-  change_metadata(path, "5.7", "6.0");
+  change_metadata(path, "6.7", "7.0");
   EXPECT_NE(refusal_of(path).find("another version | Record the session again"), std::string::npos);
   record(path, 3, 3);
   for (const char* rate : {"0000", "-200", "20x0"}) {

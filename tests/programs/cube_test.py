@@ -113,7 +113,7 @@ class Overlay(ProgramTest):
         read = read_grid(grid)
         points = read.GetPointData()
         cells = vtk_to_numpy(read.GetCells().GetConnectivityArray()).reshape(read.GetNumberOfCells(), -1)
-        return (rows[:, 1:4], rows[:, 4:7], rows[:, 7:]), (vtk_to_numpy(read.GetPoints().GetData()), cells, *(
+        return (rows[:, 1:4], rows[:, 4:7], rows[:, 7:10]), (vtk_to_numpy(read.GetPoints().GetData()), cells, *(
             vtk_to_numpy(points.GetArray(name)) for name in ("rest_displacement", "displacement")))
 
     def assert_same_field(self, nodes, values, expected_nodes, expected, tolerance=1e-10):

@@ -284,7 +284,7 @@ class Truncated(FilesTest):
 
         self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n80000,0.51,0.5,1.05\n")
         file = self.bake(cube_toml(18))
-        process = subprocess.Popen([RUNTIME, "play", file.name, "--device", "script:touch.csv", *TOOL, "--max-contacts", "4", "--fast"], cwd=self.folder,
+        process = subprocess.Popen([RUNTIME, "play", file.name, "--device", "script:touch.csv", *TOOL, "--max-contacts", "4", "--depth", "no", "--fast"], cwd=self.folder,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=little_memory, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"})
         self.addCleanup(process.kill)
         while "used packed" not in process.stderr.readline():

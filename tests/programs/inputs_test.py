@@ -47,7 +47,7 @@ class Surfaces(ProgramTest):
         return run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
 
     def test_a_corner_that_is_no_point_is_refused(self):
-        self.assert_refused(self.plan("a.obj", self.OBJ, ""), "a.obj", "polygon 4 of 4", "4 points")
+        self.assert_refused(self.plan("a.obj", self.OBJ, ""), "a.obj:8", "the corner 0", "4 points")
 
     def test_remeshing_that_spoils_the_surface_falls_back_to_cgal(self):
         if not CGAL_DATA.exists():

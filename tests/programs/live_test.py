@@ -45,7 +45,7 @@ class Live(ProgramTest):
 
     def test_a_light_press_is_that_of_the_greens_functions(self):
         file = self.bake(BLOCK)
-        greens, _ = self.force(file, 0.0005)
+        greens, _ = self.force(file, 0.0005, "--overlay", "no", "--depth", "no")
         for solver in ("linear", "corotational", "neo-hookean"):
             live, report = self.force(file, 0.0005, "--solver", solver)
             self.assertAlmostEqual(live / greens, 1.0, delta=1e-4 if solver == "linear" else 0.03, msg=solver)

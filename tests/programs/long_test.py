@@ -92,7 +92,7 @@ class Outputs(LongTest):
         self.assertEqual(len(list((self.folder / "touch.frames").iterdir())), (self.folder / "touch.pvd").read_text().count("<DataSet"))
         self.run_in(250, RUNTIME, "export", "touch.mcap", "--gltf", "touch.glb", "--fps", "1", "--to", "999")
         self.run_in(700, RUNTIME, "export", "touch.mcap", "--html", "touch.html")
-        self.run_in(100, RUNTIME, "play", CUBE, "--device", "replay:touch.mcap", "--fast")
+        self.run_in(200, RUNTIME, "play", CUBE, "--device", "replay:touch.mcap", "--fast")  # 130 of them are the fine surface
         self.assertEqual(self.run_in(100, sys.executable, "-S", "-c", READ, BINARY / "runtime" / "libpalpate.so", "touch.mcap").strip(), str(ROWS))
 
 

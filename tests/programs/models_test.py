@@ -34,7 +34,7 @@ class ModelsTest(ProgramTest):
         return self.write("touch.csv", "t,x,y,z\n" + "".join(rows)), 0.03 * size
 
     def expect_whole(self, name):
-        shutil.copytree(MODELS / name, self.folder / name)
+        shutil.copytree(MODELS / name, self.folder / name, dirs_exist_ok=True)  # the image may be there, for another
         if not (image := self.folder / "liver" / "liver.inr.gz").exists() and (MODELS / "liver" / image.name).exists():
             image.parent.mkdir(exist_ok=True)
             shutil.copy(MODELS / "liver" / image.name, image)

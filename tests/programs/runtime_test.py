@@ -667,7 +667,7 @@ class Tools(ProgramTest):
     def test_grab_holds_what_is_touched_and_pulls(self):
         file = self.bake(cube_toml(6))
         script = "t,x,y,z,grab\n0,0.5,0.5,1.4,0\n0.2,0.5,0.5,1.15,1\n0.4,0.5,0.5,1.3,1\n"
-        report, ticks, contacts = self.play(file, script, "--tool", "sphere:0.2")
+        report, ticks, contacts = self.play(file, script, "--tool", "sphere:0.2", "--depth", "no")
         self.assertLess(ticks["force"][200][2], 0)
         self.assertGreater(ticks["force"][-1][2], 0)
         self.assertTrue((contacts["held"] == 1).all())

@@ -55,6 +55,12 @@ TEST_P(TurnedStress, IsNoneOfARigidTurn) {
     EXPECT_LT(stress.norm(), 1e-9 * E);
   }
   EXPECT_GT(known, 20);
+  for (Vec3& moved : u) moved.setZero();
+  for (const Stress& stress : stress_of(turning, u, force)) {
+    if (!std::isnan(stress[0])) {
+      EXPECT_EQ(stress.norm(), 0.0) << "at rest there is nothing to colour";
+    }
+  }
 }
 
 // The body strained a little, and then turned as a whole with the forces on it: in its frames nothing has

@@ -37,46 +37,6 @@ Index stored_at(const Model& model, const Vec3& x) {
   return 0;
 }
 
-/// A body of large strain whose nodes are moved along all axes, in steps.
-class Whole {
- public:
-  Whole(const Model& model, const std::vector<Index>& nodes) : model_(model), nodes_(nodes) {
-    LiveInput input = live_input(model);
-    input.fixed.resize(input.mesh.nodes.size(), 0);
-    for (const Index node : nodes) input.fixed[static_cast<std::size_t>(node)] = 7;
-    body_ = std::make_unique<LiveBody>(input, LiveOptions{.law = LiveLaw::neo_hookean});
-    x_ = body_->start();
-  }
-
-  /// Moves each node by `to` [m] in all; the force that this takes [N].
-  Vec3 move(const Vec3& to, int parts) {
-    for (int part = 1; part <= parts; ++part) {
-      for (const Index node : nodes_)
-        x_.segment(3 * Eigen::Index{node}, 3) = model_.mesh.nodes[static_cast<std::size_t>(node)] + moved_ +
-                                                static_cast<double>(part) / parts * (to - moved_);
-      const BalanceReport report = find_balance(*body_, Eigen::VectorXd::Zero(body_->dofs()), {}, x_,
-                                                {.tolerance = 1e-8, .most_steps = 300});
-      EXPECT_LT(report.residual, 1e-6);
-    }
-    moved_ = to;
-    Eigen::VectorXd f;
-    internal_forces(*body_, x_, {}, f);
-    Vec3 sum = Vec3::Zero();
-    for (const Index node : nodes_) sum -= f.segment(3 * Eigen::Index{node}, 3);
-    return sum;
-  }
-  [[nodiscard]] Vec3 displacement(Index node) const {
-    return (x_ - body_->rest()).segment(3 * Eigen::Index{node}, 3);
-  }
-
- private:
-  const Model& model_;
-  std::vector<Index> nodes_;
-  std::unique_ptr<LiveBody> body_;
-  Eigen::VectorXd x_;
-  Vec3 moved_ = Vec3::Zero();
-};
-
 Vec3 sum(const std::vector<double>& f) {
   Vec3 total = Vec3::Zero();
   for (std::size_t k = 0; k < f.size(); k += 3) total += Vec3(f[k], f[k + 1], f[k + 2]);
@@ -88,6 +48,53 @@ std::vector<double> same(const Vec3& u, std::size_t nodes) {
   for (std::size_t k = 0; k < nodes; ++k) all.insert(all.end(), u.begin(), u.end());
   return all;
 }
+
+/// A body of large strain whose nodes are moved along all axes, in steps.
+class Whole {
+ public:
+  Whole(const Model& model, const std::vector<Index>& nodes) : model_(model), nodes_(nodes) {
+    LiveInput input = live_input(model);
+    input.fixed.resize(input.mesh.nodes.size(), 0);
+    for (const Index node : nodes) input.fixed[static_cast<std::size_t>(node)] = 7;
+    body_ = std::make_unique<LiveBody>(input, LiveOptions{.law = LiveLaw::neo_hookean});
+    x_ = body_->start();
+  }
+
+  /// Moves each node by its `to` [m] in all; the forces that this takes [N].
+  std::vector<double> move(const std::vector<double>& to, int parts) {
+    moved_.resize(to.size());
+    for (int part = 1; part <= parts; ++part) {
+      for (std::size_t k = 0; k < nodes_.size(); ++k) {
+        const Vec3 from = vector_at(moved_, 3, static_cast<Index>(k)),
+                   there = vector_at(to, 3, static_cast<Index>(k));
+        x_.segment(3 * Eigen::Index{nodes_[k]}, 3) = model_.mesh.nodes[static_cast<std::size_t>(nodes_[k])] +
+                                                     from +
+                                                     static_cast<double>(part) / parts * (there - from);
+      }
+      const BalanceReport report = find_balance(*body_, Eigen::VectorXd::Zero(body_->dofs()), {}, x_,
+                                                {.tolerance = 1e-8, .most_steps = 300});
+      EXPECT_LT(report.residual, 1e-6);
+    }
+    moved_ = to;
+    Eigen::VectorXd f;
+    internal_forces(*body_, x_, {}, f);
+    std::vector<double> forces;
+    for (const Index node : nodes_) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) forces.push_back(-f[3 * Eigen::Index{node} + axis]);
+    }
+    return forces;
+  }
+  [[nodiscard]] Vec3 displacement(Index node) const {
+    return (x_ - body_->rest()).segment(3 * Eigen::Index{node}, 3);
+  }
+
+ private:
+  const Model& model_;
+  std::vector<Index> nodes_;
+  std::unique_ptr<LiveBody> body_;
+  Eigen::VectorXd x_;
+  std::vector<double> moved_;
+};
 
 class TwoLevelBar : public testing::Test {
  protected:
@@ -113,7 +120,7 @@ TEST_F(TwoLevelBar, FeelsAsTheWholeBodyWhereItBucklesAndBends) {
   double worst = 0.0, worst_of_linear = 0.0;
   for (const Vec3& to :
        {Vec3(-0.004, 0.0, 0.0), Vec3(-0.004, 0.0, -0.02), Vec3(-0.01, 0.0, -0.04), Vec3(-0.03, 0.0, -0.1)}) {
-    const Vec3 truth = whole.move(to, 20);
+    const Vec3 truth = sum(whole.move(same(to, 1), 20));
     const TwoLevelReport report = levels.find(std::vector<Index>{tip}, f, same(to, 1), 1e-8, 60);
     EXPECT_LT(report.residual, 1e-6);
     f = levels.forces();
@@ -133,6 +140,67 @@ TEST_F(TwoLevelBar, FeelsAsTheWholeBodyWhereItBucklesAndBends) {
   }
   EXPECT_LT(worst, 0.05);
   EXPECT_GT(worst_of_linear, 5.0);
+}
+
+// A hand holds the end of the bar and turns it: about its axis, and across it. Small strain stretches what
+// turns.
+TEST_F(TwoLevelBar, FeelsAsTheWholeBodyWhereItsEndIsTurned) {
+  const Vec3 centre(length, 0.5 * width, 0.5 * width);
+  std::vector<Index> held, nodes;
+  for (std::size_t k = 0; k < model.stored_nodes.size(); ++k) {
+    const Index node = model.stored_nodes[k];
+    if (model.mesh.nodes[static_cast<std::size_t>(node)].x() < length - 1e-9) continue;
+    held.push_back(static_cast<Index>(k));
+    nodes.push_back(node);
+  }
+  ASSERT_EQ(held.size(), 9U);
+  Eigen::MatrixXd Xi(27, 27);
+  for (Eigen::Index a = 0; a < 9; ++a) {
+    for (Eigen::Index b = 0; b < 9; ++b)
+      Xi.block<3, 3>(3 * a, 3 * b) =
+          body.greens().block(held[static_cast<std::size_t>(a)], held[static_cast<std::size_t>(b)]);
+  }
+  const auto turned = [&](const Mat3& R) {
+    std::vector<double> u;
+    for (const Index node : nodes) {
+      const Vec3 out = model.mesh.nodes[static_cast<std::size_t>(node)] - centre, moved = R * out - out;
+      u.insert(u.end(), moved.begin(), moved.end());
+    }
+    return u;
+  };
+  const auto torque = [&](const std::vector<double>& f, const std::vector<double>& u) {
+    Vec3 all = Vec3::Zero();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const auto at = static_cast<Index>(k);
+      const Vec3 arm = model.mesh.nodes[static_cast<std::size_t>(nodes[k])] + vector_at(u, 3, at) - centre;
+      all += arm.cross(vector_at(f, 3, at));
+    }
+    return all;
+  };
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 1, 0)}) {
+    Whole whole(model, nodes);
+    levels.rest();
+    std::vector<double> f(27, 0.0);
+    for (const int degrees : {5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60}) {
+      const std::vector<double> u =
+          turned(Eigen::AngleAxisd(degrees * std::numbers::pi / 180.0, axis).toRotationMatrix());
+      const std::vector<double> truth = whole.move(u, 4);
+      const TwoLevelReport report = levels.find(held, f, u, 1e-8, 60);
+      EXPECT_LT(report.residual, 1e-6);
+      f = levels.forces();
+      if (degrees % 15 != 0 && degrees != 40) continue;
+      const Eigen::VectorXd linear = Xi.ldlt().solve(Eigen::Map<const Eigen::VectorXd>(u.data(), 27));
+      const auto error = [&](const std::vector<double>& found) {
+        return ((torque(found, u) - torque(truth, u)).norm() + length * (sum(found) - sum(truth)).norm()) /
+               (torque(truth, u).norm() + length * sum(truth).norm());
+      };
+      const double two_levels_off = error(f), linear_off = error({linear.begin(), linear.end()});
+      std::printf("end turned by %d degrees: %.4g Nm, %.4g N, two levels %.2f %% off, small strain %.0f %%\n",
+                  degrees, torque(truth, u).norm(), sum(truth).norm(), 100.0 * two_levels_off,
+                  100.0 * linear_off);
+      EXPECT_LT(two_levels_off, 0.05);
+    }
+  }
 }
 
 // Of small loads it is Xi f, with an error that falls with their square.

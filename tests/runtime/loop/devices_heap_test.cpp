@@ -22,8 +22,6 @@
 #include "runtime/safety/workspace.h"
 #include "tests/support/bodies/runtime_model.h"
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers have their own malloc
-
 namespace {
 thread_local long heap_calls = 0;
 }  // namespace
@@ -225,5 +223,3 @@ TEST(SafetyTick, MakesNoSystemCall) {
 
 }  // namespace
 }  // namespace palpate::devices_heap_test
-
-#endif
