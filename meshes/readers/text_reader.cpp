@@ -215,7 +215,10 @@ void TextReader::fail(const std::string& what) const {
 }
 
 void TextReader::fail_on(std::string_view found, const char* what) const {
-  fail(fmt::format("'{}' stands where {} should be", shown(found), what));
+  const bool has_comma =
+      found.find_first_not_of("+-0123456789,") == found.npos && found.find(',') != found.npos;
+  fail(fmt::format("'{}' stands where {} should be", shown(found), what),
+       has_comma ? "write decimals with a point" : remake);
 }
 
 }  // namespace palpate

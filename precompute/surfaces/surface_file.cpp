@@ -86,7 +86,8 @@ void read_off(TextReader& in, PolygonSoup& soup) {
   if (!in.at_end()) in.fail("the file goes on after the last of its faces", export_again);
 }
 
-/// A corner of an OBJ face: "7", "7/1", "7//2", counted from 1, or from the last point down from -1.
+/// A corner of an OBJ face: "7", "7/1", "7//2", counted from 1, or from the last point down from -1. Points
+/// may follow: whether all corners are points is checked at the end.
 std::size_t obj_corner(TextReader& in, std::size_t points) {
   const std::string_view word = in.word("the number of a corner");
   const std::string_view digits = word.substr(0, word.find('/'));
@@ -95,7 +96,7 @@ std::size_t obj_corner(TextReader& in, std::size_t points) {
   if (error == std::errc::invalid_argument || end != digits.data() + digits.size())
     in.fail_on(word, "the number of a corner");
   const auto count = static_cast<std::int64_t>(points);
-  if (error != std::errc() || number == 0 || number > count || number < -count)
+  if (error != std::errc() || number == 0 || number < -count)
     in.fail(fmt::format("a face has the corner {}, which is none of the {} points before it",
                         digits.substr(0, 24), count),
             export_again);

@@ -251,6 +251,7 @@ TEST_F(SurfaceInput, ReadsWhatProgramsWrite) {
       {"path.obj", with(w, first, "# C:\\\n" + first)},
       {"skipped.obj", with(w, face, "mg 1\nl 1 2\ncurv 0 1\n" + face)},
       {"slashes.obj", with(with(w, first, "v 0 0 0 1 0.5 0  # red\n"), face, "f -8/1 3//2 2/1/1\n")},
+      {"points_last.obj", w.substr(w.find(face)) + w.substr(0, w.find(face))},
       {"tab.stl", with(s, "solid s", "solid\ts")},
       {"name.stl", with(s, "solid s", "solid solid facet vertex")},
       {"line.stl", with(s, "\n", " ")},
@@ -276,12 +277,13 @@ TEST_F(SurfaceInput, SaysLineAndReason) {
                     b = binary_stl(cube());
   const std::string first = "0.000000 0.000000 0.000000";
   const std::tuple<std::string, std::string, std::vector<std::string>> files[] = {
-      {"comma.off", with(o, first, "0,0 0,0 0,0"), {"comma.off:3", "'0,0'", "a coordinate"}},
+      {"comma.off", with(o, first, "0,0 0,0 0,0"), {"comma.off:3", "'0,0'", "a coordinate", "with a point"}},
       {"more.off", with(o, "8 12 0", "8 11 0"), {"more.off:21", "after the last"}},
       {"corner.off", with(o, "3 0 2 1", "3 0 2 8"), {"corner.off:11", "0 to 7"}},
       {"four.off", "4" + o, {"four.off:1", "4OFF"}},
       {"wide.off", "\xff\xfeO", {"wide.off:1", "UTF-16"}},
       {"zero.obj", with(w, "f 1 3 2", "f 1 3 0"), {"zero.obj:9", "corner 0", "8 points"}},
+      {"nine.obj", with(w, "f 1 3 2", "f 1 3 9"), {"polygon 1 of 12", "8 points"}},
       {"word.obj", with(w, "f 1 3 2", "f 1 x 2"), {"word.obj:9", "'x'"}},
       {"end.stl", with(s, "endsolid s", ""), {"end.stl:", "without endsolid"}},
       {"two.stl", with(s, "outer loop\nvertex " + first, "outer loop"), {"two.stl:7", "2 corners"}},
