@@ -44,7 +44,7 @@ const Bytes command_by_hand = bytes(
 
 bridge_state as_state(const Bytes& message) {
   bridge_state said{};
-  std::memcpy(&said, message.data(), std::min(message.size(), sizeof said));
+  if (!message.empty()) std::memcpy(&said, message.data(), std::min(message.size(), sizeof said));
   return said;
 }
 
