@@ -336,11 +336,12 @@ TEST(Walk, GoesThroughInAHostThatCaresForItsChildrenItself) {
 TEST(Walk, GoesThroughInAHostWithThreadsAndTimers) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
+  const SignalAction handled(SIGALRM,
+                             [](int) {});  // until the thread has ended, to which the last one may go
   std::atomic<bool> stop = false;
   std::jthread beside([&] {
     while (!stop) std::vector<std::string>(100, "memory that is taken and given back");
   });
-  const SignalAction handled(SIGALRM, [](int) {});
   const itimerval often = {{0, 2000}, {0, 2000}}, never = {};
   setitimer(ITIMER_REAL, &often, nullptr);
   for (int k = 0; k < 10; ++k) EXPECT_TRUE(is_index_right(folder / "a.palpate.hdf"));
