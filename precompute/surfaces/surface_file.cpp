@@ -96,7 +96,7 @@ std::size_t obj_corner(TextReader& in, std::size_t points) {
   if (error == std::errc::invalid_argument || end != digits.data() + digits.size())
     in.fail_on(word, "the number of a corner");
   const auto count = static_cast<std::int64_t>(points);
-  if (error != std::errc() || number == 0 || number < -count)
+  if (error != std::errc() || number == 0 || number < -count || number > std::numeric_limits<Index>::max())
     in.fail(fmt::format("a face has the corner {}, which is none of the {} points before it",
                         digits.substr(0, 24), count),
             export_again);
