@@ -572,7 +572,7 @@ class Tools(ProgramTest):
 
     def test_a_sphere_is_pushed_out_where_it_touches(self):
         file = self.bake(cube_toml(6))
-        report, ticks, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2")
+        report, ticks, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--depth", "no")
         self.assertEqual((report["tool"]["radius_m"], report["tool"]["length_m"]), (0.2, 0))
         self.assertGreater(report["most_contacts"], 1)
         room = report["room"]
@@ -601,7 +601,7 @@ class Tools(ProgramTest):
     def test_friction(self):
         text = cube_toml(6).replace("density = 1000", "friction = 0.1")
         for given, mu in (((), 0.1), (("--friction", "0.3"), 0.3), (("--friction", "0"), 0)):
-            report, ticks, contacts = self.play(self.bake(text), self.PRESS, "--tool", "sphere:0.2", *given)
+            report, ticks, contacts = self.play(self.bake(text), self.PRESS, "--tool", "sphere:0.2", "--overlay", "no", "--depth", "no", *given)
             self.assertEqual(report["tool"]["friction"], mu if given else None)
             f, n = self.vectors(contacts, "f"), self.vectors(contacts, "n")
             normal = (f * n).sum(axis=1)
