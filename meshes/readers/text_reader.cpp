@@ -215,8 +215,8 @@ void TextReader::fail(const std::string& what) const {
 }
 
 void TextReader::fail_on(std::string_view found, const char* what) const {
-  const bool has_comma =
-      found.find_first_not_of("+-0123456789,") == found.npos && found.find(',') != found.npos;
+  const bool has_comma =  // one: a list of numbers has more
+      found.find_first_not_of("+-0123456789,") == found.npos && std::ranges::count(found, ',') == 1;
   fail(fmt::format("'{}' stands where {} should be", shown(found), what),
        has_comma ? "write decimals with a point" : remake);
 }

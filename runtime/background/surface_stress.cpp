@@ -14,7 +14,7 @@
 namespace palpate {
 namespace {
 
-constexpr double rounding_strain = 1e-12;
+constexpr double rounding_strain = 1e-12;  // below which a strain in a turned frame is none
 
 unsigned held_axes(const Model& model, Index mesh_node) {
   return model.fixed[mesh_node] & ((1U << model.dimension()) - 1U);
