@@ -157,7 +157,8 @@ test('how a model is looked at is kept, and an address opens it', async (t) => {
   assert.ok(above.y < below.y - 50 && Math.abs(above.x - below.x) < 0.05 * (below.y - above.y), 'y is upright in the picture');
   await part(page, 'look-from').selectOption('front');
   await part(page, 'show-parallel').check();
-  await page.keyboard.press('Shift+ArrowRight');
+  await until(page, () => Object.values(localStorage).some((text) => text.startsWith('{') && JSON.parse(text).look.parallel === '1'));
+  await page.keyboard.press('Shift+ArrowRight'); // when nothing else is about to be kept
   const { towards } = await told(page, 'eye');
   await part(page, 'theme').selectOption('light');
   await part(page, 'copy-link').click();

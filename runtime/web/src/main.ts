@@ -3,7 +3,7 @@ import './style.css';
 import { Beside, Neighbour, type Shared } from './beside';
 import { of_frame, RecentEfforts, sentence } from './best_effort';
 import { button, forget_rem, input, part, select, show_value, toast, write } from './dom';
-import type { Margins } from './eye';
+import type { Eye, Margins } from './eye';
 import { FileSource, stored_session } from './file_source';
 import { format_si, format_time, short_number } from './format';
 import { History } from './history';
@@ -294,13 +294,13 @@ class Page implements Listener {
     button('screenshot').addEventListener('click', () => {
       void this.saving_.save_picture(`${this.state_?.model?.name ?? 'Palpate'}-${this.felt().tick}`);
     });
-    button('fit').addEventListener('click', () => this.picture_.view.eye.fit());
+    button('fit').addEventListener('click', () => this.look((eye) => eye.fit()));
     button('save-video').addEventListener('click', () => this.film());
     button('follow').addEventListener('click', () => this.follow());
     select('look-from').addEventListener('change', () => {
-      if (select('look-from').value) this.picture_.view.eye.look_from(select('look-from').value);
+      const from = select('look-from').value;
+      if (from) this.look((eye) => eye.look_from(from));
       select('look-from').value = '';
-      this.want_keep();
     });
     select('theme').addEventListener('change', () => this.choose_theme(select('theme').value as Theme));
     this.theme_.changed = () => this.show_theme();
@@ -319,12 +319,11 @@ class Page implements Listener {
   }
 
   private listen_keys(): void {
-    const { eye } = this.picture_.view;
     const fields = Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8].map((n) => [String(n), () => this.drawing_.choose(n)]));
     const arrow = (right: number, down: number) => () => {
       if (this.mode_ !== 'live') this.replay_.move(right);
       else if (this.is_hand()) this.hand_.key_move(key_pixels * right, key_pixels * down);
-      else eye.turn(-0.1 * right, -0.1 * down);
+      else this.look((eye) => eye.turn(-0.1 * right, -0.1 * down));
     };
     on_keys({
       ' ': () => (this.mode_ === 'live' ? this.run_.toggle_pause() : this.replay_.toggle()),
@@ -335,12 +334,12 @@ class Page implements Listener {
       o: () => this.drawing_.toggle('parallel'),
       c: () => this.drawing_.next_section(),
       v: () => this.drawing_.show_menu(part('view-card').hidden),
-      f: () => eye.fit(),
-      t: () => eye.look_from('top'),
-      b: () => eye.look_from('usual'),
+      f: () => this.look((eye) => eye.fit()),
+      t: () => this.look((eye) => eye.look_from('top')),
+      b: () => this.look((eye) => eye.look_from('usual')),
       p: () => this.toggle_panel(),
-      '+': () => eye.zoom(1.15),
-      '-': () => eye.zoom(1 / 1.15),
+      '+': () => this.look((eye) => eye.zoom(1.15)),
+      '-': () => this.look((eye) => eye.zoom(1 / 1.15)),
       '[': () => this.hand_.key_deepen(-1),
       ']': () => this.hand_.key_deepen(1),
       '?': () => this.show_help(part('help-text').hidden),
@@ -349,10 +348,10 @@ class Page implements Listener {
       ArrowRight: arrow(1, 0),
       ArrowUp: arrow(0, -1),
       ArrowDown: arrow(0, 1),
-      'Shift+ArrowLeft': () => eye.turn(0.1, 0),
-      'Shift+ArrowRight': () => eye.turn(-0.1, 0),
-      'Shift+ArrowUp': () => eye.turn(0, 0.1),
-      'Shift+ArrowDown': () => eye.turn(0, -0.1),
+      'Shift+ArrowLeft': () => this.look((eye) => eye.turn(0.1, 0)),
+      'Shift+ArrowRight': () => this.look((eye) => eye.turn(-0.1, 0)),
+      'Shift+ArrowUp': () => this.look((eye) => eye.turn(0, 0.1)),
+      'Shift+ArrowDown': () => this.look((eye) => eye.turn(0, -0.1)),
       ...fields,
     });
     const { pad } = this.picture_.view;
@@ -458,6 +457,12 @@ class Page implements Listener {
   private get kept(): Kept {
     const { eye } = this.picture_.view;
     return { look: this.drawing_.kept, place: eye.is_fitted ? null : eye.place };
+  }
+
+  /** What a person does to see it from elsewhere. */
+  private look(act: (eye: Eye) => void): void {
+    act(this.picture_.view.eye);
+    this.want_keep();
   }
 
   private want_keep(): void {
