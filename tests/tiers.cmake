@@ -46,7 +46,7 @@ set(palpate_dear
   programs_runtime_test.Tools                    test_a_sphere_is_pushed_out_where_it_touches,test_friction
   programs_outputs_test.Existing                 test_precompute,test_links_keep_their_place
   programs_cattaneo_test.Cattaneo                test_it_slips_in_a_ring
-  geometry_test.ImageMesh                        BallHasItsVolumeAndPlace,CavitiesStayEmpty,BadImages,UnreadableFiles
+  geometry_test.ImageMesh                        BallHasItsVolumeAndPlace,CavitiesStayEmpty,EdgesOfBoxesAreKept,BadImages,UnreadableFiles
   programs_depth_test.Depth                      test_runs_are_equal_and_replay,test_a_rod_that_gives_way_does_not_lose_the_tool
   programs_long_test.Outputs                     -
   programs_session_test.Session                  test_says_what_is_in_it

@@ -87,7 +87,9 @@ Mesh mesh_surface_with_cgal(const TriangleSurface& surface, const MeshOptions& o
       .hint = "use a larger edge_length or facet_distance in [mesh], or a simpler surface"};
   const ChildResult result = run_in_child(task, [&] {
     try {
-      Mesh mesh = mesh3::export_mesh(make_complex(surface, options), [](int) { return 0; });
+      Mesh mesh = mesh3::with_other_edges_if_it_fails(options, [&](const MeshOptions& now) {
+        return mesh3::export_mesh(make_complex(surface, now), [](int) { return 0; });
+      });
       mesh.tagged_facets.clear();
       mesh.facet_tags.clear();
       return ChildResult{0, pack(mesh)};

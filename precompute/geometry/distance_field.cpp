@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <set>
+#include <utility>
 
 namespace palpate {
 namespace {
@@ -119,13 +120,36 @@ std::vector<float> signed_distances(const VoxelGrid& grid, const std::vector<std
   return distance;
 }
 
-DistanceField::DistanceField(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside)
-    : grid_(grid), distance_(signed_distances(grid, inside)) {
+DistanceField::DistanceField(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside,
+                             std::vector<std::uint8_t> known)
+    : grid_(grid), distance_(signed_distances(grid, inside)), known_(std::move(known)) {
   smooth(grid_, distance_);  // the staircases of voxels are not the body's shape
 }
 
+/// Signed distance of a point in a known voxel to the faces of the voxels beside it; a voxel or more if there
+/// are none.
+double DistanceField::to_faces(const Vec3& x, const std::array<Index, 3>& voxel,
+                               double smooth) const noexcept {
+  const bool is_inside = known_[grid_.at(voxel[0], voxel[1], voxel[2])] == SharpEdges::inside;
+  double nearest = grid_.spacing.maxCoeff();
+  for (Index n = 0; n < 27; ++n) {
+    const std::array<Index, 3> other = {voxel[0] + n % 3 - 1, voxel[1] + n / 3 % 3 - 1, voxel[2] + n / 9 - 1};
+    if (std::ranges::any_of(std::array{0U, 1U, 2U},
+                            [&](unsigned a) { return other[a] < 0 || other[a] >= grid_.size[a]; }))
+      continue;
+    const std::size_t v = grid_.at(other[0], other[1], other[2]);
+    if ((known_[v] == SharpEdges::by_field ? distance_[v] > 0.0F : known_[v] == SharpEdges::inside) ==
+        is_inside)
+      continue;
+    const Vec3 away = ((x - grid_.center(v)).cwiseAbs() - 0.5 * grid_.spacing).cwiseMax(0.0);
+    nearest = std::min(nearest, away.norm());
+  }
+  nearest = std::max(nearest, is_inside ? smooth : -smooth);  // which is steeper on flat faces
+  return is_inside ? nearest : -nearest;
+}
+
 double DistanceField::operator()(const Vec3& x) const noexcept {
-  std::array<Index, 3> cell{};
+  std::array<Index, 3> cell{}, voxel{};
   Vec3 t;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
@@ -133,6 +157,7 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
     const double position = std::clamp((x[a] - grid_.origin[a]) / grid_.spacing[a], 0.0, last);
     cell[axis] = std::min(static_cast<Index>(position), grid_.size[axis] - 2);
     t[a] = position - static_cast<double>(cell[axis]);
+    voxel[axis] = cell[axis] + (t[a] > 0.5 ? 1 : 0);
   }
   const auto row = [&](Index j, Index k) {
     const std::size_t at = grid_.at(cell[0], cell[1] + j, cell[2] + k);
@@ -140,7 +165,10 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
   };
   const double front = (1.0 - t[1]) * row(0, 0) + t[1] * row(1, 0);
   const double back = (1.0 - t[1]) * row(0, 1) + t[1] * row(1, 1);
-  return (1.0 - t[2]) * front + t[2] * back;
+  const double smooth = (1.0 - t[2]) * front + t[2] * back;
+  const bool is_known =
+      !known_.empty() && known_[grid_.at(voxel[0], voxel[1], voxel[2])] != SharpEdges::by_field;
+  return is_known ? to_faces(x, voxel, smooth) : smooth;
 }
 
 void DistanceField::grow_to(double voxels) {
@@ -154,7 +182,9 @@ void DistanceField::grow_to(double voxels) {
   std::vector<Eighth> near;
   for (std::size_t v = 0; v < distance_.size(); ++v) {
     const auto middle = static_cast<double>(distance_[v]);
-    if (middle > reach) {
+    if (!known_.empty() && known_[v] != SharpEdges::by_field) {
+      inside += known_[v] == SharpEdges::inside ? 8.0 : 0.0;
+    } else if (middle > reach) {
       inside += 8.0;
     } else if (middle > -most - reach) {
       std::array<double, 8> values{};
@@ -186,7 +216,8 @@ void DistanceField::grow_to(double voxels) {
   for (float& distance : distance_) distance -= static_cast<float>(high);
 }
 
-LabelField::LabelField(const VoxelBody& body) : body_(body, body.inside) {
+LabelField::LabelField(const VoxelBody& body, const SharpEdges& sharp)
+    : body_(body, body.inside, sharp.known) {
   std::set<Index> labels;
   Index last = VoxelBody::no_label;
   for (const Index label : body.labels) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "precompute/geometry/sharp_edges.h"
 #include "precompute/images/voxel_body.h"
 
 namespace palpate {
@@ -14,21 +15,27 @@ namespace palpate {
 std::vector<float> signed_distances(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside);
 
 /// Distance below the boundary of the inside, negative outside: signed_distances smoothed over neighbouring
-/// voxels, linear between voxel centres.
+/// voxels, linear between voxel centres; beside sharp edges the distance to the faces of the voxels.
 class DistanceField {
  public:
-  DistanceField(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside);
+  /// `known`: SharpEdges::known of the same inside.
+  DistanceField(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside,
+                std::vector<std::uint8_t> known = {});
 
   /// Value at a point in the image's length unit; beyond the grid the value at its rim.
   [[nodiscard]] double operator()(const Vec3& x) const noexcept;
 
   /// Moves the boundary outward, by a voxel at most, until the volume inside is that of so many voxels. Does
-  /// nothing if it is at least that.
+  /// nothing if it is at least that. Faces beside sharp edges stay.
   void grow_to(double voxels);
 
  private:
+  [[nodiscard]] double to_faces(const Vec3& x, const std::array<Index, 3>& voxel,
+                                double smooth) const noexcept;
+
   VoxelGrid grid_;
   std::vector<float> distance_;
+  std::vector<std::uint8_t> known_;
 };
 
 /// Label of a body at a point: the body is where its DistanceField is positive, and there the label is the
@@ -40,7 +47,7 @@ class LabelField {
     double depth;  ///< distance to the end of this label; 0 outside
   };
 
-  explicit LabelField(const VoxelBody& body);
+  explicit LabelField(const VoxelBody& body, const SharpEdges& sharp = {});
 
   /// Moves the boundary of the body outward until it holds the volume of so many voxels.
   void grow_to(double voxels) { body_.grow_to(voxels); }

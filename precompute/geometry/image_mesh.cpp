@@ -4,6 +4,7 @@
 #include <CGAL/Labeled_mesh_domain_3.h>
 #include <CGAL/Mesh_complex_3_in_triangulation_3.h>
 #include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_domain_with_polyline_features_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/Random.h>
 #include <CGAL/make_mesh_3.h>
@@ -29,14 +30,16 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
+using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>;
 using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
-using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+using Complex =
+    CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, Domain::Corner_index, Domain::Curve_index>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
 constexpr double relative_error = 1e-4;  // relative to the body's size: for locating boundary and interfaces
-constexpr double seed_spacing = 1.5;     // [edge_length] largest between the first points on interfaces
+constexpr double sharp_edge_per_edge = 1.3;  // bound on a sharp edge's parts: nodes as dense as on faces
+constexpr double seed_spacing = 1.5;         // [edge_length] largest between the first points on interfaces
 
 Vec3 as_vector(const Point& p) {
   return {p.x(), p.y(), p.z()};
@@ -64,16 +67,21 @@ CGAL::Bbox_3 bounding_box(const VoxelGrid& grid) {
   return {low[0], low[1], low[2], high[0], high[1], high[2]};
 }
 
-Domain make_domain(const VoxelGrid& grid, const LabelField& field) {
+Domain make_domain(const VoxelGrid& grid, const LabelField& field, const SharpEdges& sharp) {
   CGAL::get_default_random() = CGAL::Random(0);
-  return Domain(
+  Domain domain(
       parameters::function = [&field](const Point& p) { return field(as_vector(p)).number; },
       parameters::bounding_object = bounding_box(grid), parameters::relative_error_bound = relative_error);
+  std::vector<std::vector<Point>> lines;
+  for (const auto& [from, to] : sharp.edges) lines.push_back({as_point(from), as_point(to)});
+  domain.add_features(lines.begin(), lines.end());
+  return domain;
 }
 
 void insert(Complex& complex, const Point& point, const Domain::Index& index) {
   const Complex::Vertex_handle vertex = complex.triangulation().insert(Triangulation::Point(point));
-  complex.set_dimension(vertex, 2);  // on a surface
+  if (vertex == Complex::Vertex_handle()) return;  // hidden by a node of a sharp edge
+  complex.set_dimension(vertex, 2);                // on a surface
   complex.set_index(vertex, index);
 }
 
@@ -97,7 +105,7 @@ void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& bo
   }
 }
 
-/// Delaunay refinement of the surfaces and, unless `hollow`, of the inside.
+/// Delaunay refinement of sharp edges, of the surfaces and, unless `hollow`, of the inside.
 Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& field,
                const MeshOptions& options, bool hollow) {
   const double facet_distance =
@@ -109,35 +117,37 @@ Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& fi
   const Criteria::Cell_criteria cells =
       hollow ? Criteria::Cell_criteria(0.0, 0.0) : Criteria::Cell_criteria(options.radius_edge, cell_size);
 
+  const Criteria criteria(Criteria::Edge_criteria(sharp_edge_per_edge * *options.edge_length), facets, cells);
   Complex complex;
+  CGAL::Mesh_3::internal::init_c3t3_with_features(complex, domain, criteria);
   seed_boundary(complex, domain);
   const bool one_label = field.labels().size() == 1;
   if (!one_label) {
     seed_interfaces(complex, domain, body, field, *options.edge_length);
   }
   // three labels may meet in an edge, so that only a single one has manifold surfaces
-  CGAL::refine_mesh_3(complex, domain, Criteria(facets, cells), parameters::no_reset_c3t3(),
+  CGAL::refine_mesh_3(complex, domain, criteria, parameters::no_reset_c3t3(),
                       one_label ? parameters::manifold() : parameters::non_manifold(),
                       parameters::no_perturb(), parameters::no_exude());
   return complex;
 }
 
 /// Meshes with Mesh_3 in a child process; `hollow`: the surfaces alone.
-Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions& options,
-               const std::string& where, bool hollow) {
+Mesh run_mesh3(const VoxelBody& body, const SharpEdges& sharp, const LabelField& field,
+               const MeshOptions& options, const std::string& where, bool hollow) {
   const ChildTask task = {.name = "CGAL's mesher",
                           .where = where,
                           .limits = meshing_limits(expected_size(body, options), options, where),
                           .hint = "use a larger edge_length or facet_distance in [mesh]"};
   const ChildResult result = run_in_child(task, [&] {
     try {
-      const Domain domain = make_domain(body, field);
-      Complex complex = refine(domain, body, field, options, hollow);
-      if (!hollow) {
-        mesh3::optimise(complex, domain, options);
-      }
-      return ChildResult{0, pack(mesh3::export_mesh(complex, [&](int number) {
-                           return field.labels()[static_cast<std::size_t>(number) - 1];
+      return ChildResult{0, pack(mesh3::with_other_edges_if_it_fails(options, [&](const MeshOptions& now) {
+                           const Domain domain = make_domain(body, field, sharp);
+                           Complex complex = refine(domain, body, field, now, hollow);
+                           if (!hollow) mesh3::optimise(complex, domain, now);
+                           return mesh3::export_mesh(complex, [&](int number) {
+                             return field.labels()[static_cast<std::size_t>(number) - 1];
+                           });
                          }))};
     } catch (const CGAL::Failure_exception&) {
       return ChildResult{1, {}};
@@ -234,11 +244,12 @@ void report_volumes(const Mesh& mesh, const VoxelBody& body, std::vector<std::st
 Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
   const std::string where = image.file.string();
   const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
-  LabelField field(body);
+  const SharpEdges sharp = sharp_edges(body);
+  LabelField field(body, sharp);
   // Smoothing shrinks everything convex: a ball nine voxels thick by 10 %.
   field.grow_to((1.0 - most_smoothed) * check_thickness(body, field, where, notes));
   const bool by_tetgen = options.mesher == Mesher::tetgen;
-  Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);
+  Mesh mesh = run_mesh3(body, sharp, field, options, where, by_tetgen);
   if (by_tetgen) {
     mesh = fill_with_tetgen(mesh, options, expected_size(body, options), where);
   }

@@ -23,6 +23,7 @@ constexpr double wanted_dihedral = 12.0;
 constexpr double facet_size_per_edge = 1.2;
 constexpr double hollow_facet_size_per_edge = 0.77;
 constexpr double radius_per_edge = 0.73;
+constexpr double other_edges = 0.97;
 /// Largest number of iterations of a global optimisation; most converge earlier.
 constexpr int most_iterations = 50;
 
@@ -45,6 +46,19 @@ void optimise(Complex& complex, const Domain& domain, const MeshOptions& options
   }
   if (options.exude) {
     CGAL::exude_mesh_3(complex, parameters::time_limit = 0.0, parameters::sliver_bound = wanted_dihedral);
+  }
+}
+
+/// Returns make(options), or with edges a little shorter where CGAL gives up: on meshes as regular as those
+/// of boxes its perturbation at times cannot take back a move.
+template <typename Make>
+Mesh with_other_edges_if_it_fails(MeshOptions options, const Make& make) {
+  try {
+    return make(options);
+  } catch (const CGAL::Failure_exception&) {
+    if (!options.edge_length) throw;
+    *options.edge_length *= other_edges;
+    return make(options);
   }
 }
 
