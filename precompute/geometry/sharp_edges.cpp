@@ -1,6 +1,7 @@
 #include "precompute/geometry/sharp_edges.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace palpate {
 namespace {
@@ -32,12 +33,7 @@ class EdgesOfVoxels {
   explicit EdgesOfVoxels(const VoxelBody& body) : body_(body), kept_(body.voxels()) {}
 
   std::vector<Run> find() {
-    std::vector<Run> runs;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      Corner ends = body_.size;
-      ends[axis] = 1;
-      for_corners({}, ends, [&](const Corner& first) { find_in_line(axis, first, runs); });
-    }
+    std::vector<Run> runs = find_runs();
     std::size_t before = 0;
     while (runs.size() != before) {
       before = runs.size();
@@ -49,22 +45,45 @@ class EdgesOfVoxels {
   }
 
  private:
-  void find_in_line(std::size_t axis, Corner at, std::vector<Run>& runs) const {
-    unsigned last = 0;
-    Index begin = 0;
-    for (Index i = 0; i <= body_.size[axis]; ++i) {
-      at[axis] = i;
-      const unsigned now = i < body_.size[axis] ? voxels_about(axis, at) : 0;
-      if (now == last) continue;
-      const bool is_diagonal = last == 0b0110 || last == 0b1001;
-      if (last != 0 && !is_diagonal && i - begin >= least) {
-        Run run{axis, at, at};
-        run.from[axis] = begin;
-        runs.push_back(run);
-      }
-      last = now;
-      begin = i;
+  struct Edge {
+    std::size_t axis;
+    Corner at;
+    unsigned voxels;
+  };
+
+  [[nodiscard]] std::vector<Run> find_runs() const {
+    std::vector<Edge> edges = find_edges();
+    const auto line = [](const Edge& edge) {
+      return std::array{edge.at[(edge.axis + 1) % 3], edge.at[(edge.axis + 2) % 3], edge.at[edge.axis]};
+    };
+    std::ranges::sort(edges, {}, [&](const Edge& edge) { return std::pair(edge.axis, line(edge)); });
+    std::vector<Run> runs;
+    for (auto first = edges.begin(), last = first; first != edges.end(); first = last) {
+      Run run{first->axis, first->at, first->at};
+      const auto goes_on = [&](const Edge& edge) {
+        return edge.axis == run.axis && edge.voxels == first->voxels && edge.at == run.to;
+      };
+      for (last = first; last != edges.end() && goes_on(*last); ++last) ++run.to[run.axis];
+      if (last - first >= least) runs.push_back(run);
     }
+    return runs;
+  }
+
+  [[nodiscard]] std::vector<Edge> find_edges() const {
+    std::vector<Edge> edges;
+    const std::size_t y = body_.at(0, 1, 0), z = body_.at(0, 0, 1);
+    for_corners({1, 1, 1}, body_.size, [&](const Corner& at) {
+      const std::uint8_t* v = body_.inside.data() + body_.at(at[0], at[1], at[2]);
+      const int around = v[0] + *(v - 1) + *(v - y) + *(v - y - 1) + *(v - z) + *(v - z - 1) + *(v - z - y) +
+                         *(v - z - y - 1);
+      if (around == 0 || around == 8) return;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const unsigned voxels = voxels_about(axis, at);
+        const bool is_diagonal = voxels == 0b0110 || voxels == 0b1001;
+        if (voxels != 0 && !is_diagonal) edges.push_back({axis, at, voxels});
+      }
+    });
+    return edges;
   }
 
   /// Bits of those of the four voxels about the edge from a corner on that are inside; 0 if there is no edge.

@@ -20,6 +20,7 @@ struct SharpEdges {
                                            ///< by_field; empty if there is no edge
 };
 
+/// Needs an empty rim, as made by crop.
 SharpEdges sharp_edges(const VoxelBody& body);
 
 }  // namespace palpate
