@@ -14,11 +14,28 @@ namespace palpate {
 namespace {
 
 using Eigen::Map;
-using Eigen::Matrix3Xd;
+using Eigen::MatrixX3d;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double parts_of_cell = 3.0;  // along each axis
+
+/// y = K x of a symmetric K [n x n], whose lower triangle is stored column by column.
+void multiply(const std::vector<double>& K, const double* x, std::ptrdiff_t n, double* y) {
+  std::fill_n(y, n, 0.0);
+  const double* column = K.data();
+  for (std::ptrdiff_t j = 0; j < n; ++j) {
+    const double x_j = x[j];
+    double sum = column[0] * x_j;
+#pragma omp simd reduction(+ : sum)
+    for (std::ptrdiff_t i = 1; i < n - j; ++i) {
+      y[j + i] += column[i] * x_j;
+      sum += column[i] * x[j + i];
+    }
+    y[j] += sum;
+    column += n - j;
+  }
+}
 
 }  // namespace
 
@@ -37,8 +54,8 @@ class CoarseBody::Terms {
     }
   }
 
-  /// Numbers the terms of a part with these quadrature points; `dofs` [3 terms] of the coarse field, by axis,
-  /// -1: held, or not in the plane.
+  /// Numbers the terms of a part with these quadrature points; `dofs` [3 terms] of the coarse field, axis
+  /// after axis, -1: held, or not in the plane.
   void number(const std::vector<Index>& points, std::vector<Index>& dofs) {
     for (const std::size_t key : keys_) place_[key] = -1;
     keys_.clear();
@@ -50,8 +67,8 @@ class CoarseBody::Terms {
           keys_.push_back(key);
         });
     }
-    for (const std::size_t key : keys_) {
-      for (Index axis = 0; axis < 3; ++axis)
+    for (Index axis = 0; axis < 3; ++axis) {
+      for (const std::size_t key : keys_)
         dofs.push_back((key >> axis & 1U) != 0 ? fine_.dimension() * static_cast<Index>(key / 8) + axis : -1);
     }
   }
@@ -86,9 +103,9 @@ class CoarseBody::Terms {
 
 /// A part at some q.
 struct CoarseBody::State {
-  Matrix3Xd u;     // of its terms
+  MatrixX3d u;     // of its terms
   Mat3 F, R, G;    // mean deformation gradient, its rotation, (tr U I - U)^-1
-  Matrix3Xd q, y;  // displacement of its terms in the part's frame, and K times it
+  MatrixX3d q, y;  // displacement of its terms in the part's frame, and K times it
 };
 
 CoarseBody::CoarseBody(const LiveBody& fine, const CoarseField& field) : fine_(fine), dofs_(field.dofs()) {
@@ -120,49 +137,47 @@ void CoarseBody::measure(Terms& of_body, const std::vector<Index>& points, Part&
   const Eigen::Index terms = of_body.count();
   part.element = points.front() / fine_.points();
   MatrixXd slopes = MatrixXd::Zero(3 * std::ssize(points), terms);  // times the root of the weight
-  part.G.setZero(3, terms);
+  part.G.setZero(terms, 3);
   for (std::size_t k = 0; k < points.size(); ++k) {
     const double weight = fine_.weight(points[k]), root = std::sqrt(weight);
     part.volume += weight;
     of_body.for_each_gradient(points[k], [&](Eigen::Index term, const Vec3& gradient) {
-      part.G.col(term) += weight * gradient;
+      part.G.row(term) += weight * gradient.transpose();
       for (Eigen::Index axis = 0; axis < 3; ++axis)
         slopes(axis * std::ssize(points) + static_cast<Eigen::Index>(k), term) += root * gradient[axis];
     });
   }
   part.G /= part.volume;
-  part.K.setZero(3 * terms, 3 * terms);
+  MatrixXd K = MatrixXd::Zero(3 * terms, 3 * terms);
   const PointTangent C = tangent_at(fine_.options().law, fine_.constants(part.element), Mat3::Identity(),
                                     fine_.initial_strain(part.element), TangentKind::exact);
   for (Eigen::Index i = 0; i < 3; ++i) {
     for (Eigen::Index j = 0; j < 3; ++j) {
       const auto n = std::ssize(points);
       const MatrixXd spread = slopes.middleRows(i * n, n).transpose() * slopes.middleRows(j * n, n) -
-                              part.volume * part.G.row(i).transpose() * part.G.row(j);
+                              part.volume * part.G.col(i) * part.G.col(j).transpose();
       for (Eigen::Index r = 0; r < 3; ++r) {
         for (Eigen::Index s = 0; s < 3; ++s) {
           const double factor = C(r + 3 * i, s + 3 * j);
-          if (factor == 0.0) continue;
-          for (Eigen::Index a = 0; a < terms; ++a) {
-            for (Eigen::Index b = 0; b < terms; ++b) part.K(3 * a + r, 3 * b + s) += factor * spread(a, b);
-          }
+          if (factor != 0.0) K.block(r * terms, s * terms, terms, terms) += factor * spread;
         }
       }
     }
   }
+  for (Eigen::Index j = 0; j < 3 * terms; ++j)
+    for (Eigen::Index i = j; i < 3 * terms; ++i) part.K.push_back(K(i, j));
 }
 
 CoarseBody::State CoarseBody::state(const Part& part, const VectorXd& q) const {
   State at;
-  at.u.resize(3, part.G.cols());
+  at.u.resize(part.G.rows(), 3);
   for (std::size_t k = 0; k < part.dofs.size(); ++k)
     at.u.data()[k] = part.dofs[k] < 0 ? 0.0 : q[part.dofs[k]];
-  at.F = Mat3::Identity() + at.u * part.G.transpose();
+  at.F = Mat3::Identity() + at.u.transpose() * part.G;
   at.R = fine_.dimension() == 3 ? nearest_rotation(at.F) : nearest_rotation_in_plane(at.F);
-  at.q = at.R.transpose() * at.u;
-  at.y.resize(3, at.q.cols());
-  Map<VectorXd>(at.y.data(), at.y.size()).noalias() =
-      part.K.selfadjointView<Eigen::Lower>() * Map<const VectorXd>(at.q.data(), at.q.size());
+  at.q = at.u * at.R;
+  at.y.resize(at.q.rows(), 3);
+  multiply(part.K, at.q.data(), at.q.size(), at.y.data());
   at.G = spin_of_skew(at.R, at.F);
   return at;
 }
@@ -175,67 +190,105 @@ double CoarseBody::energy(const VectorXd& q, VectorXd* gradient) const {
                                          fine_.initial_strain(part.element));
     sum += part.volume * stress.energy + 0.5 * at.q.cwiseProduct(at.y).sum();
     if (gradient == nullptr) continue;
-    Vec3 torque = Vec3::Zero();
-    for (Eigen::Index term = 0; term < at.q.cols(); ++term) torque += at.q.col(term).cross(at.y.col(term));
-    const Vec3 turn = at.G.transpose() * torque;
-    for (Eigen::Index term = 0; term < at.q.cols(); ++term) {
-      const Vec3 slope = part.G.col(term);
-      const Vec3 force = part.volume * stress.P * slope + at.R * (at.y.col(term) - turn.cross(slope));
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Index dof = part.dofs[3 * static_cast<std::size_t>(term) + axis];
-        if (dof >= 0) (*gradient)[dof] += force[static_cast<Eigen::Index>(axis)];
-      }
-    }
+    const Mat3 moment = at.q.transpose() * at.y;
+    const Vec3 torque(moment(1, 2) - moment(2, 1), moment(2, 0) - moment(0, 2), moment(0, 1) - moment(1, 0));
+    const Mat3 turn = cross_matrix(at.G.transpose() * torque);
+    const MatrixX3d force =
+        part.G * (part.volume * stress.P - at.R * turn).transpose() + at.y * at.R.transpose();
+    for (std::size_t k = 0; k < part.dofs.size(); ++k)
+      if (part.dofs[k] >= 0) (*gradient)[part.dofs[k]] += force.data()[k];
   }
   return sum;
 }
 
+namespace {
+
+/// Row (axis, term) is the row of that axis of [v_term]_x.
+MatrixX3d cross_rows(const MatrixX3d& v) {
+  const Eigen::Index n = v.rows();
+  MatrixX3d rows = MatrixX3d::Zero(3 * n, 3);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::Index next = (axis + 1) % 3, last = (axis + 2) % 3;
+    rows.col(next).segment(axis * n, n) = -v.col(last);
+    rows.col(last).segment(axis * n, n) = v.col(next);
+  }
+  return rows;
+}
+
+/// Adds K, of which the lower triangle is stored.
+void add_symmetric(const std::vector<double>& K, MatrixXd& to) {
+  const double* entry = K.data();
+  for (Eigen::Index j = 0; j < to.cols(); ++j) {
+    to(j, j) += *entry++;
+    for (Eigen::Index i = j + 1; i < to.rows(); ++i, ++entry) {
+      to(i, j) += *entry;
+      to(j, i) += *entry;
+    }
+  }
+}
+
+/// Adds the blocks (i >= j) of a symmetric matrix of terms, axis by axis, and their mirror images.
+void scatter(const MatrixXd& blocks, const std::vector<Index>& dofs, MatrixXd& K) {
+  const Eigen::Index terms = blocks.rows() / 3;
+  for (Eigen::Index column = 0; column < blocks.cols(); ++column) {
+    const Index to = dofs[static_cast<std::size_t>(column)];
+    if (to < 0) continue;
+    const Eigen::Index first = column / terms * terms;
+    for (Eigen::Index row = first; row < blocks.rows(); ++row) {
+      const Index from = dofs[static_cast<std::size_t>(row)];
+      if (from < 0) continue;
+      K(from, to) += blocks(row, column);
+      if (row >= first + terms) K(to, from) += blocks(row, column);
+    }
+  }
+}
+
+}  // namespace
+
 MatrixXd CoarseBody::tangent(const VectorXd& q) const {
   MatrixXd K = MatrixXd::Zero(dofs_, dofs_);
-  MatrixXd local, spin, by_turn;
-  for (const Part& part : parts_) {
+  MatrixXd left, right, in_frame, half_turned, sum;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Part& part = parts_[p];
     const State at = state(part, q);
-    const Eigen::Index terms = at.q.cols();
+    const Eigen::Index n = at.q.rows();
     const PointTangent C = part.volume * tangent_at(fine_.options().law, fine_.constants(part.element), at.F,
                                                     fine_.initial_strain(part.element), TangentKind::exact);
-    // In the part's frame: the field's change less the turning, and the terms of its first order.
-    spin.resize(3, 3 * terms);      // B
-    by_turn.resize(3 * terms, 3);   // [q]_x, so that the frame's q changes by dq + [q]_x B dq
-    MatrixXd couple(3, 3 * terms);  // [y]_x
-    Mat3 middle = Mat3::Zero();
-    for (Eigen::Index term = 0; term < terms; ++term) {
-      spin.middleCols<3>(3 * term) = at.G * cross_matrix(part.G.col(term));
-      by_turn.middleRows<3>(3 * term) = cross_matrix(at.q.col(term));
-      couple.middleCols<3>(3 * term) = cross_matrix(at.y.col(term));
-      middle +=
-          0.5 * (at.y.col(term) * at.q.col(term).transpose() + at.q.col(term) * at.y.col(term).transpose()) -
-          at.y.col(term).dot(at.q.col(term)) * Mat3::Identity();
-    }
-    const MatrixXd K_turn = part.K.selfadjointView<Eigen::Lower>() * by_turn;
-    const MatrixXd cross = (K_turn.transpose() + couple).transpose() * spin;
-    middle += by_turn.transpose() * K_turn;
-    local = part.K + cross + cross.transpose();
-    local.noalias() += spin.transpose() * (middle * spin);
-    for (Eigen::Index a = 0; a < terms; ++a) {
-      const Vec3 g = part.G.col(a);
-      const Eigen::Matrix<double, 3, 9> T =
-          g.x() * C.topRows<3>() + g.y() * C.middleRows<3>(3) + g.z() * C.bottomRows<3>();
-      for (Eigen::Index b = 0; b <= a; ++b) {
-        const Vec3 h = part.G.col(b);
-        const Mat3 block = at.R * local.block<3, 3>(3 * a, 3 * b) * at.R.transpose() +
-                           h.x() * T.leftCols<3>() + h.y() * T.middleCols<3>(3) + h.z() * T.rightCols<3>();
-        for (std::size_t i = 0; i < 3; ++i) {
-          for (std::size_t j = 0; j < 3; ++j) {
-            const Index row = part.dofs[3 * static_cast<std::size_t>(a) + i],
-                        column = part.dofs[3 * static_cast<std::size_t>(b) + j];
-            if (row < 0 || column < 0) continue;
-            const double value = block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-            K(row, column) += value;
-            if (a != b) K(column, row) += value;
-          }
-        }
+    // In the part's frame q changes by dq + [q]_x B dq, less the terms of first order; B its spin.
+    const MatrixX3d spin = -cross_rows(part.G) * at.G.transpose();  // B^T
+    const MatrixX3d by_turn = cross_rows(at.q);
+    MatrixX3d K_turn(3 * n, 3);
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      multiply(part.K, by_turn.col(axis).data(), 3 * n, K_turn.col(axis).data());
+    const Mat3 moment = at.y.transpose() * at.q;
+    const Mat3 middle = 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity() +
+                        by_turn.transpose() * K_turn;
+    left.resize(3 * n, 6);
+    right.resize(6, 3 * n);
+    left.leftCols<3>() = K_turn - cross_rows(at.y) + 0.5 * spin * middle;
+    left.rightCols<3>() = spin;
+    right.topRows<3>() = spin.transpose();
+    right.bottomRows<3>() = left.leftCols<3>().transpose();
+    in_frame.noalias() = left * right;
+    add_symmetric(part.K, in_frame);
+
+    const bool is_first = p == 0 || parts_[p - 1].dofs != part.dofs;  // of those with the same terms
+    if (is_first) sum.setZero(3 * n, 3 * n);
+    half_turned.resize(n, 3 * n);
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      half_turned = at.R(i, 0) * in_frame.topRows(n) + at.R(i, 1) * in_frame.middleRows(n, n) +
+                    at.R(i, 2) * in_frame.bottomRows(n);
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        Mat3 C_ij;
+        for (Eigen::Index k = 0; k < 3; ++k)
+          for (Eigen::Index l = 0; l < 3; ++l) C_ij(k, l) = C(3 * k + i, 3 * l + j);
+        auto block = sum.block(i * n, j * n, n, n);
+        block += at.R(j, 0) * half_turned.leftCols(n) + at.R(j, 1) * half_turned.middleCols(n, n) +
+                 at.R(j, 2) * half_turned.rightCols(n);
+        block.noalias() += (part.G * C_ij).lazyProduct(part.G.transpose());
       }
     }
+    if (p + 1 == parts_.size() || parts_[p + 1].dofs != part.dofs) scatter(sum, part.dofs, K);
   }
   return K;
 }

@@ -28,11 +28,13 @@ class CoarseBody {
  private:
   /// Part of a cell, of one material. A term is what a coarse node moves along some axes.
   struct Part {
-    std::vector<Index> dofs;  // [3 terms] of the coarse field, by axis; -1: held, or not in the plane
+    std::vector<Index> dofs;  // [3 terms] of the coarse field, all terms of an axis after those of the one
+                              // before; -1: held, or not in the plane
     Index element = 0;        // one of those in it
     double volume = 0.0;      // [m^3]
-    Eigen::Matrix3Xd G;       // [3 x terms] mean gradients [1/m]
-    Eigen::MatrixXd K;        // [3 terms x 3 terms] of small strain, by the gradients' variation [N/m]
+    Eigen::MatrixX3d G;       // [terms x 3] mean gradients [1/m]
+    std::vector<double> K;    // [3 terms x 3 terms] of small strain, by the gradients' variation [N/m]: the
+                              // lower triangle, column by column
   };
   struct State;
   class Terms;
