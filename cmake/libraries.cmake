@@ -26,6 +26,9 @@ if(PALPATE_NATIVE)
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)  # GCC 12 is wrong in its own AVX, regex and string headers (GCC bugs 105593, 105562, 105651)
   target_compile_options(palpate_options INTERFACE -Wno-maybe-uninitialized -Wno-uninitialized -Wno-restrict)
+  if(PALPATE_SANITIZE MATCHES thread)
+    target_compile_options(palpate_options INTERFACE -Wno-tsan)  # of fences in the standard library
+  endif()
   # Where the processor has AVX without AVX-512 and where it has both, GCC 12 sees other packets read past vectors of three doubles.
   target_compile_options(palpate_options INTERFACE -Wno-array-bounds -Wno-stringop-overread -Wno-stringop-overflow)
 endif()
