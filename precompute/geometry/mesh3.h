@@ -23,6 +23,7 @@ constexpr double wanted_dihedral = 12.0;
 constexpr double facet_size_per_edge = 1.2;
 constexpr double hollow_facet_size_per_edge = 0.77;
 constexpr double radius_per_edge = 0.73;
+/// Length of the edges of a second try, of those asked for.
 constexpr double other_edges = 0.97;
 /// Largest number of iterations of a global optimisation; most converge earlier.
 constexpr int most_iterations = 50;

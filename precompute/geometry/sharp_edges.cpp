@@ -1,7 +1,6 @@
 #include "precompute/geometry/sharp_edges.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace palpate {
 namespace {
@@ -28,6 +27,7 @@ void for_corners(const Corner& low, const Corner& high, const Work& work) {
   }
 }
 
+/// Runs of a body's voxels, less those beside which other edges are.
 class EdgesOfVoxels {
  public:
   explicit EdgesOfVoxels(const VoxelBody& body) : body_(body), kept_(body.voxels()) {}
@@ -45,45 +45,30 @@ class EdgesOfVoxels {
   }
 
  private:
-  struct Edge {
-    std::size_t axis;
-    Corner at;
-    unsigned voxels;
-  };
-
   [[nodiscard]] std::vector<Run> find_runs() const {
-    std::vector<Edge> edges = find_edges();
-    const auto line = [](const Edge& edge) {
-      return std::array{edge.at[(edge.axis + 1) % 3], edge.at[(edge.axis + 2) % 3], edge.at[edge.axis]};
-    };
-    std::ranges::sort(edges, {}, [&](const Edge& edge) { return std::pair(edge.axis, line(edge)); });
     std::vector<Run> runs;
-    for (auto first = edges.begin(), last = first; first != edges.end(); first = last) {
-      Run run{first->axis, first->at, first->at};
-      const auto goes_on = [&](const Edge& edge) {
-        return edge.axis == run.axis && edge.voxels == first->voxels && edge.at == run.to;
-      };
-      for (last = first; last != edges.end() && goes_on(*last); ++last) ++run.to[run.axis];
-      if (last - first >= least) runs.push_back(run);
-    }
-    return runs;
-  }
-
-  [[nodiscard]] std::vector<Edge> find_edges() const {
-    std::vector<Edge> edges;
     const std::size_t y = body_.at(0, 1, 0), z = body_.at(0, 0, 1);
     for_corners({1, 1, 1}, body_.size, [&](const Corner& at) {
       const std::uint8_t* v = body_.inside.data() + body_.at(at[0], at[1], at[2]);
       const int around = v[0] + *(v - 1) + *(v - y) + *(v - y - 1) + *(v - z) + *(v - z - 1) + *(v - z - y) +
                          *(v - z - y - 1);
       if (around == 0 || around == 8) return;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const unsigned voxels = voxels_about(axis, at);
-        const bool is_diagonal = voxels == 0b0110 || voxels == 0b1001;
-        if (voxels != 0 && !is_diagonal) edges.push_back({axis, at, voxels});
-      }
+      for (std::size_t axis = 0; axis < 3; ++axis) add_run_from(axis, at, runs);
     });
-    return edges;
+    return runs;
+  }
+
+  /// Adds the run that begins at a corner, if one does.
+  void add_run_from(std::size_t axis, const Corner& at, std::vector<Run>& runs) const {
+    const unsigned voxels = voxels_about(axis, at);
+    const bool is_diagonal = voxels == 0b0110 || voxels == 0b1001;
+    if (voxels == 0 || is_diagonal) return;
+    Run run{axis, at, at};
+    --run.to[axis];
+    if (voxels_about(axis, run.to) == voxels) return;
+    do ++run.to[axis];
+    while (run.to[axis] < body_.size[axis] && voxels_about(axis, run.to) == voxels);
+    if (run.to[axis] - at[axis] >= least) runs.push_back(run);
   }
 
   /// Bits of those of the four voxels about the edge from a corner on that are inside; 0 if there is no edge.

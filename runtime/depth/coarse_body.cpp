@@ -164,6 +164,7 @@ void CoarseBody::measure(Terms& of_body, const std::vector<Index>& points, Part&
       }
     }
   }
+  part.K.reserve(static_cast<std::size_t>(3 * terms * (3 * terms + 1) / 2));
   for (Eigen::Index j = 0; j < 3 * terms; ++j)
     for (Eigen::Index i = j; i < 3 * terms; ++i) part.K.push_back(K(i, j));
 }
