@@ -327,11 +327,10 @@ bool SparseCholesky::factorise(const Eigen::SparseMatrix<double>& A) {
 
 /// Solves L_ee^T x = y - L_ke^T x_k in place, where y already has x_k.
 void SparseCholesky::substitute_back(auto& y) const {
-  std::decay_t<decltype(y)> part;
   for (std::size_t s = eliminated(); s-- > 0;) {
     const Supernode& supernode = supernodes_[s];
     const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
-    part.resize(supernode.below(), y.cols());
+    std::decay_t<decltype(y)> part(supernode.below(), y.cols());
     for (int i = 0; i < supernode.below(); ++i) part.row(i) = y.row(rows[i]);
     auto own = y.middleRows(supernode.first, supernode.columns);
     own.noalias() -= lower_of(supernode).transpose() * part;
@@ -341,14 +340,14 @@ void SparseCholesky::substitute_back(auto& y) const {
 
 template <class Columns>
 Columns SparseCholesky::solve_columns(const Columns& b) const {
-  Columns x(b.rows(), b.cols()), y(b.rows(), b.cols()), part;
+  Columns x(b.rows(), b.cols()), y(b.rows(), b.cols());
   for (int k = 0; k < b.rows(); ++k) y.row(position_[at(k)]) = b.row(k);
   for (const Supernode& supernode : supernodes_) {
     const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
     auto own = y.middleRows(supernode.first, supernode.columns);
     if ((own.array() == 0.0).all()) continue;  // few columns of b reach all of L
     diagonal_of(supernode).template triangularView<Eigen::Lower>().solveInPlace(own);
-    part.noalias() = lower_of(supernode) * own;
+    const Columns part = lower_of(supernode) * own;
     for (int i = 0; i < supernode.below(); ++i) y.row(rows[i]) -= part.row(i);
   }
   substitute_back(y);

@@ -133,8 +133,8 @@ const LoopReport& PlaySession::run(const std::atomic<bool>& stop) {
 void PlaySession::finish_recording() {
   try {
     recorder_->finish();
-  } catch (const std::exception& error) {
-    recording_failure_ = as_error(error);
+  } catch (const std::exception&) {
+    recording_failure_ = handled_error("", "close other programs");
   }
 }
 

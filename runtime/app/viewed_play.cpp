@@ -93,8 +93,8 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
       report = run_act(*session, stop);
       parts.add({because, plan.text, plan.record, session->dropped()}, report);
       if (has_hand()) latched_ = session->fault();
-    } catch (const std::exception& error) {
-      if (!good || !take_back(plan, *good, as_error(error))) throw;
+    } catch (const std::exception&) {
+      if (!good || !take_back(plan, *good, handled_error("", "close other programs"))) throw;
       continue;
     }
     const bool over = options_.duration && report.ticks >= input_.ticks;

@@ -4,8 +4,10 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "base/vectors.h"
 #include "runtime/live/live_model.h"
@@ -35,8 +37,9 @@ LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
       live_(body.live()->body),
       stepper_(live_, body.live()->stepper),
       compliance_(body, renews_compliance),
-      state_(state_at_rest(body)),
-      predicted_(state_),
+      rest_(state_at_rest(body)),
+      state_(rest_),
+      predicted_(rest_),
       push_(Eigen::VectorXd::Zero(live_.dofs())),
       by_load_(static_cast<std::size_t>(body.greens().order())),
       by_last_load_(by_load_.size()),
@@ -47,17 +50,21 @@ LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
 }
 
 /// Predicts the next step, under the forces of the last one.
-void LiveMotion::predict() noexcept {
-  predicted_ = state_;
-  predicted_report_ = stepper_.step(predicted_, push_);
+void LiveMotion::predict() {
+  LiveState next = state_;
+  predicted_report_ = stepper_.step(next, push_);
+  predicted_ = std::move(next);
 }
 
 void LiveMotion::rest() noexcept {
-  state_ = state_at_rest(body_);
+  state_ = predicted_ = rest_;
   push_.setZero();
   compliance_.rest();
   std::fill(by_last_load_.begin(), by_last_load_.end(), 0.0);
-  predict();
+  try {
+    predict();
+  } catch (const std::exception&) {  // out of memory: the body stands still for a step
+  }
   found_ = untouched_ = state_.x;
   const std::lock_guard lock(mutex_);
   telling_ = {};
@@ -78,26 +85,34 @@ void LiveMotion::put_on(const NodalLoad& load, Eigen::VectorXd& push) const noex
 }
 
 void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
-  const int d = live_.dimension();
-  Eigen::VectorXd push(live_.dofs());
-  put_on(job.load, push);
-  displace(job.load, by_load_);
-  LiveReport report = predicted_report_;
-  if (push == push_) {
-    state_ = predicted_;
-  } else {
-    report = stepper_.step(state_, push);
+  try {
+    step(job);
+  } catch (const std::exception&) {  // out of memory: the body stands still for a step
   }
-  const double error = compare(job, report);
-  push_ = push;
-  predict();
-  follow_untouched();
-  if (compliance_.follow(state_, error)) displace(job.load, by_load_);
-  std::swap(by_load_, by_last_load_);
+  const int d = live_.dimension();
   for (Index stored = 0; stored < body_.greens().nodes(); ++stored) {
     const Vec3 moved = node_part(predicted_.x, d, body_.mesh_node(stored)) - body_.rest_position(stored);
     set_vector(u, d, stored, moved - vector_at(by_last_load_, d, stored));
   }
+}
+
+void LiveMotion::step(const MotionJob& job) {
+  Eigen::VectorXd push(live_.dofs());
+  put_on(job.load, push);
+  displace(job.load, by_load_);
+  LiveReport report = predicted_report_;
+  LiveState next = predicted_;
+  if (push != push_) {
+    next = state_;
+    report = stepper_.step(next, push);
+  }
+  state_ = std::move(next);
+  const double error = compare(job, report);
+  push_ = std::move(push);
+  predict();
+  follow_untouched();
+  if (compliance_.follow(state_, error)) displace(job.load, by_load_);
+  std::swap(by_load_, by_last_load_);
 }
 
 /// Computes the positions of the nodes without the tool: as they were before it touched, held ones at their

@@ -53,7 +53,8 @@ class LiveMotion final : public MotionStepper {
 
  private:
   void put_on(const NodalLoad& load, Eigen::VectorXd& push) const noexcept;
-  void predict() noexcept;
+  void predict();
+  void step(const MotionJob& job);
   void displace(const NodalLoad& load, std::vector<double>& u) const noexcept;
   double compare(const MotionJob& job, const LiveReport& report) noexcept;
   void follow_untouched() noexcept;
@@ -63,14 +64,14 @@ class LiveMotion final : public MotionStepper {
   LiveStepper stepper_;
   LiveCompliance compliance_;
   LiveReport predicted_report_;
-  LiveState state_, predicted_;       // present state; state at the end of the predicted step
-  Eigen::VectorXd push_;              // [d N] forces of the prediction
-  std::vector<double> by_load_;       // [n] W f of the last job
-  std::vector<double> by_last_load_;  // [n] W f_p
-  Eigen::VectorXd found_;             // [d N] positions of all nodes when the tool was last away,
-  Eigen::VectorXd untouched_;         // [d N] found_ moved with the body, at the end of the predicted step
-  std::vector<Index> far_;            // [N] workspace: nodes in the order of their distance from the tool
-  mutable std::mutex mutex_;          // guards telling_
+  LiveState rest_, state_, predicted_;  // at rest; present state; state at the end of the predicted step
+  Eigen::VectorXd push_;                // [d N] forces of the prediction
+  std::vector<double> by_load_;         // [n] W f of the last job
+  std::vector<double> by_last_load_;    // [n] W f_p
+  Eigen::VectorXd found_;               // [d N] positions of all nodes when the tool was last away,
+  Eigen::VectorXd untouched_;           // [d N] found_ moved with the body, at the end of the predicted step
+  std::vector<Index> far_;              // [N] workspace: nodes in the order of their distance from the tool
+  mutable std::mutex mutex_;            // guards telling_
   LiveTelling telling_;
 };
 

@@ -35,6 +35,8 @@ MotionSource::MotionSource(const Body& body, const State& state, const MotionSou
       jobs_(state.surface.motion.job()),
       samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.motion_size()))}),
       timely_(state.tools.size(), Vec3::Zero()) {
+  if (!in_background_) posted_.assign(most_posted, state.surface.motion.job());
+  for (MotionJob& none : posted_) none.step = -1;
   if (in_background_) worker_ = std::thread([this] { work(); });
 }
 
@@ -88,9 +90,10 @@ void MotionSource::post(State& state) noexcept {
     jobs_.next() = job;
     jobs_.publish();
   } else {
-    if (job.step < posted_step_) posted_.clear();  // the state was reset
-    if (posted_.size() == most_posted) posted_.pop_front();
-    posted_.push_back(job);
+    if (job.step < posted_step_)  // the state was reset
+      for (MotionJob& old : posted_) old.step = -1;
+    posted_[next_posted_] = job;
+    next_posted_ = (next_posted_ + 1) % most_posted;
   }
   posted_step_ = job.step;
   posted_seen_ = job.seen;

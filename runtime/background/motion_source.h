@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -55,7 +54,8 @@ class MotionSource {
   bool in_background_;
   Latest<MotionJob> jobs_;
   Latest<MotionSample> samples_;
-  std::deque<MotionJob> posted_;   // last jobs; not in the background
+  std::vector<MotionJob> posted_;  // last jobs; not in the background
+  std::size_t next_posted_ = 0;
   std::int64_t posted_step_ = -1;  // of the last job posted
   std::int64_t posted_seen_ = -1;
   std::vector<Vec3> timely_;      // [tools] force when the body was last in time [N]

@@ -246,50 +246,51 @@ void scatter(const MatrixXd& blocks, const std::vector<Index>& dofs, MatrixXd& K
 
 }  // namespace
 
+void CoarseBody::add_tangent(const Part& part, const VectorXd& q, MatrixXd& to) const {
+  const State at = state(part, q);
+  const Eigen::Index n = at.q.rows();
+  const PointTangent C = part.volume * tangent_at(fine_.options().law, fine_.constants(part.element), at.F,
+                                                  fine_.initial_strain(part.element), TangentKind::exact);
+  // In the part's frame q changes by dq + [q]_x B dq, less the terms of first order; B its spin.
+  const MatrixX3d spin = -cross_rows(part.G) * at.G.transpose();  // B^T
+  const MatrixX3d by_turn = cross_rows(at.q);
+  MatrixX3d K_turn(3 * n, 3);
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    multiply(part.K, by_turn.col(axis).data(), 3 * n, K_turn.col(axis).data());
+  const Mat3 moment = at.y.transpose() * at.q;
+  const Mat3 middle =
+      0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity() + by_turn.transpose() * K_turn;
+  MatrixXd left(3 * n, 6), right(6, 3 * n), in_frame(3 * n, 3 * n), half_turned(n, 3 * n);
+  left.leftCols<3>() = K_turn - cross_rows(at.y) + 0.5 * spin * middle;
+  left.rightCols<3>() = spin;
+  right.topRows<3>() = spin.transpose();
+  right.bottomRows<3>() = left.leftCols<3>().transpose();
+  in_frame.noalias() = left * right;
+  add_symmetric(part.K, in_frame);
+
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    half_turned = at.R(i, 0) * in_frame.topRows(n) + at.R(i, 1) * in_frame.middleRows(n, n) +
+                  at.R(i, 2) * in_frame.bottomRows(n);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      Mat3 C_ij;
+      for (Eigen::Index k = 0; k < 3; ++k)
+        for (Eigen::Index l = 0; l < 3; ++l) C_ij(k, l) = C(3 * k + i, 3 * l + j);
+      auto block = to.block(i * n, j * n, n, n);
+      block += at.R(j, 0) * half_turned.leftCols(n) + at.R(j, 1) * half_turned.middleCols(n, n) +
+               at.R(j, 2) * half_turned.rightCols(n);
+      block.noalias() += (part.G * C_ij).lazyProduct(part.G.transpose());
+    }
+  }
+}
+
 MatrixXd CoarseBody::tangent(const VectorXd& q) const {
   MatrixXd K = MatrixXd::Zero(dofs_, dofs_);
-  MatrixXd left, right, in_frame, half_turned, sum;
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const Part& part = parts_[p];
-    const State at = state(part, q);
-    const Eigen::Index n = at.q.rows();
-    const PointTangent C = part.volume * tangent_at(fine_.options().law, fine_.constants(part.element), at.F,
-                                                    fine_.initial_strain(part.element), TangentKind::exact);
-    // In the part's frame q changes by dq + [q]_x B dq, less the terms of first order; B its spin.
-    const MatrixX3d spin = -cross_rows(part.G) * at.G.transpose();  // B^T
-    const MatrixX3d by_turn = cross_rows(at.q);
-    MatrixX3d K_turn(3 * n, 3);
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-      multiply(part.K, by_turn.col(axis).data(), 3 * n, K_turn.col(axis).data());
-    const Mat3 moment = at.y.transpose() * at.q;
-    const Mat3 middle = 0.5 * (moment + moment.transpose()) - moment.trace() * Mat3::Identity() +
-                        by_turn.transpose() * K_turn;
-    left.resize(3 * n, 6);
-    right.resize(6, 3 * n);
-    left.leftCols<3>() = K_turn - cross_rows(at.y) + 0.5 * spin * middle;
-    left.rightCols<3>() = spin;
-    right.topRows<3>() = spin.transpose();
-    right.bottomRows<3>() = left.leftCols<3>().transpose();
-    in_frame.noalias() = left * right;
-    add_symmetric(part.K, in_frame);
-
-    const bool is_first = p == 0 || parts_[p - 1].dofs != part.dofs;  // of those with the same terms
-    if (is_first) sum.setZero(3 * n, 3 * n);
-    half_turned.resize(n, 3 * n);
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      half_turned = at.R(i, 0) * in_frame.topRows(n) + at.R(i, 1) * in_frame.middleRows(n, n) +
-                    at.R(i, 2) * in_frame.bottomRows(n);
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        Mat3 C_ij;
-        for (Eigen::Index k = 0; k < 3; ++k)
-          for (Eigen::Index l = 0; l < 3; ++l) C_ij(k, l) = C(3 * k + i, 3 * l + j);
-        auto block = sum.block(i * n, j * n, n, n);
-        block += at.R(j, 0) * half_turned.leftCols(n) + at.R(j, 1) * half_turned.middleCols(n, n) +
-                 at.R(j, 2) * half_turned.rightCols(n);
-        block.noalias() += (part.G * C_ij).lazyProduct(part.G.transpose());
-      }
-    }
-    if (p + 1 == parts_.size() || parts_[p + 1].dofs != part.dofs) scatter(sum, part.dofs, K);
+  for (auto part = parts_.begin(); part != parts_.end();) {
+    const std::vector<Index>& dofs = part->dofs;  // many parts of a cell have the same
+    const auto terms = std::ssize(dofs);
+    MatrixXd sum = MatrixXd::Zero(terms, terms);
+    for (; part != parts_.end() && part->dofs == dofs; ++part) add_tangent(*part, q, sum);
+    scatter(sum, dofs, K);
   }
   return K;
 }

@@ -41,6 +41,8 @@ class CoarseBody {
 
   void measure(Terms& of_body, const std::vector<Index>& points, Part& part) const;
   [[nodiscard]] State state(const Part& part, const Eigen::VectorXd& q) const;
+  /// Adds a part's tangent [3 terms x 3 terms] to the blocks (i >= j) of the axes.
+  void add_tangent(const Part& part, const Eigen::VectorXd& q, Eigen::MatrixXd& to) const;
 
   const LiveBody& fine_;
   Eigen::Index dofs_;

@@ -10,11 +10,6 @@
 
 namespace palpate {
 
-Error as_error(const std::exception& error) {
-  const auto* known = dynamic_cast<const Error*>(&error);
-  return known != nullptr ? *known : Error(error.what(), "", "");
-}
-
 std::string in_one_line(const Error& error) {
   const std::string where = error.where().empty() ? "" : error.where() + ": ";
   return where + error.what() + (error.hint().empty() ? "" : " (" + error.hint() + ")");

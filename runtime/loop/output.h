@@ -1,16 +1,12 @@
 // Text output of the program.
 #pragma once
 
-#include <exception>
 #include <string>
 #include <string_view>
 
 #include "base/error.h"
 
 namespace palpate {
-
-/// Returns `error` itself if it is an Error, otherwise an Error with its text and without place and hint.
-Error as_error(const std::exception& error);
 
 /// Formats `WHERE: WHAT (HINT)`, without the parts that are empty.
 std::string in_one_line(const Error& error);

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "runtime/loop/output.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
 
@@ -158,17 +157,17 @@ void Recorder::write() noexcept {
       if (!taken) std::this_thread::sleep_for(recorder_pause);
     }
     writer_.checkpoint();
-  } catch (const std::exception& error) {
+  } catch (const std::exception&) {
     failure_ = std::current_exception();
-    fail(error);
+    fail(handled_error("", "close other programs"));
   }
 }
 
-void Recorder::fail(const std::exception& reason) noexcept {
+void Recorder::fail(const Error& reason) noexcept {
   ticks_given_.kept = writer_.ticks();
   pictures_given_.kept = writer_.pictures();
   failed_ = true;
-  if (on_failure_) on_failure_(as_error(reason));
+  if (on_failure_) on_failure_(reason);
 }
 
 }  // namespace palpate

@@ -72,7 +72,7 @@ class Recorder {
   bool try_push(const TickRecord& tick) noexcept;
   bool try_push(RecordedPicture& picture) noexcept;
   void write() noexcept;
-  void fail(const std::exception& reason) noexcept;
+  void fail(const Error& reason) noexcept;
   bool take_all(bool closing);
   void take(const TickRecord& tick);
   bool take_pictures(double before);
