@@ -31,10 +31,11 @@ Error handled_error(const std::string& where, const std::string& if_no_memory) {
     return {"cannot be used: " + error.code().message(), error.path1().string(),
             "check the file, the links that lead to it and the rights of its folder"};
   } catch (const std::system_error& error) {
-    if (error.code() == std::errc::resource_unavailable_try_again)
+    if (error.code() == std::errc::resource_unavailable_try_again) {
       return {
           "a thread could not be started", where,
           "Raise the limits on address space and processes (ulimit -v, ulimit -u, those of the container)"};
+    }
     if (error.code() == std::errc::not_enough_memory)
       return {"no more memory could be had", where, if_no_memory};
     return {error.what(), where, "this is a defect of Palpate; please report it"};

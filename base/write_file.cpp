@@ -81,7 +81,7 @@ int standard_stream(const struct stat& status) {
 std::filesystem::path link_target(const std::filesystem::path& file) {
   std::error_code failed;
   if (!std::filesystem::is_symlink(file, failed)) return file;
-  const std::filesystem::path target = std::filesystem::canonical(file, failed);
+  std::filesystem::path target = std::filesystem::canonical(file, failed);
   if (failed)
     throw Error("is a symbolic link to nothing", file.string(), "remove the link, or write elsewhere");
   return target;

@@ -152,10 +152,11 @@ std::span<const std::byte> checked(std::span<const std::byte> index, const std::
   if (!begins_with(index, index_magic)) throw Error("is not a Palpate file", where, give_ours);
   if (index.size() < static_cast<std::size_t>(index_bytes)) say_truncated(index.size(), index_bytes, where);
   IndexBytes head(index.subspan(index_magic.size()), where);
-  if (const std::uint64_t version = head.number(); version != index_version)
+  if (const std::uint64_t version = head.number(); version != index_version) {
     throw Error("its index has version " + std::to_string(version) + ", this program reads version " +
                     std::to_string(index_version),
                 where, "Precompute it again with this program's palpate-precompute");
+  }
   const std::uint64_t length = head.number();
   if (length < head_bytes || length > index.size()) head.refuse();
   const std::span<const std::byte> content = index.first(length).subspan(head_bytes);
@@ -176,10 +177,11 @@ std::string text_of(std::span<const std::uint64_t> dims) {
 /// Size of an array [byte]; nullopt if it overflows.
 std::optional<std::uint64_t> bytes_of(const NumberType& type, std::span<const std::uint64_t> dims) {
   auto bytes = static_cast<std::int64_t>(type.bytes);
-  for (const std::uint64_t dim : dims)
+  for (const std::uint64_t dim : dims) {
     if (dim > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()) ||
         __builtin_mul_overflow(bytes, static_cast<std::int64_t>(dim), &bytes))
       return std::nullopt;
+  }
   return static_cast<std::uint64_t>(bytes);
 }
 
@@ -200,11 +202,12 @@ void check_object(const std::string& path, const FileObject& object, std::uint64
     if (object.offset != 0) index.refuse();
     return;
   }
-  if (object.offset > file_bytes || object.bytes > file_bytes - object.offset)
+  if (object.offset > file_bytes || object.bytes > file_bytes - object.offset) {
     throw Error(path + " (" + text_of(object.dims) + ") needs " + std::to_string(object.bytes) +
                     " bytes, more than the file holds (" + std::to_string(file_bytes) +
                     "): the file is truncated",
                 where, copy_again);
+  }
   if (object.offset < static_cast<std::uint64_t>(index_bytes))
     throw Error(path + " lies on the file's index", where, copy_again);
 }
@@ -232,10 +235,11 @@ std::vector<std::byte> make_index(const FileObjects& objects, std::uint64_t file
     put(content, object);
   }
   const std::size_t length = head_bytes + content.size();
-  if (length > static_cast<std::size_t>(index_bytes))
+  if (length > static_cast<std::size_t>(index_bytes)) {
     throw Error("its index would take " + std::to_string(length) + " bytes, " + std::to_string(index_bytes) +
                     " are there",
                 where, "Leave out what is not needed, or shorten its texts");
+  }
   const std::string digits = checksum(std::span<const std::byte>(content));
   std::vector<std::byte> index;
   put(index, std::as_bytes(std::span(index_magic)));

@@ -273,12 +273,13 @@ void check_is_read(const std::filesystem::path& file, std::string_view geometry)
   const FileKind* const kind = by_content != nullptr && !is_container ? by_content : by_name;
   if (kind == nullptr || kind == kind_by_name(".toml")) return;
   const std::string where = file.string();
-  if (kind->geometry.empty())
+  if (kind->geometry.empty()) {
     throw Error(
         fmt::format(
             "is {}{}{}", kind->what, kind == by_name ? "" : " by its contents",
             kind == kind_by_name(".hdf") || kind == kind_by_name(".mcap") ? "" : ", which is not read"),
         where, filled_in(kind->command, file));
+  }
   if (!geometry.empty() && geometry != kind->geometry)
     throw Error(fmt::format("is {}, and {} = in [geometry] does not read that", kind->what, geometry), where,
                 fmt::format("write {} = under [geometry]", kind->geometry));

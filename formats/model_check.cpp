@@ -32,21 +32,24 @@ void count_patches(const Model& model, Counts& counts) {
 }
 
 void check_plane(const std::vector<Vec3>& rows, const std::string& path, const std::string& where) {
-  for (std::size_t i = 0; i < rows.size(); ++i)
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].z() != 0.0)
       refuse(where, path + ": row " + std::to_string(i) + " has z = " + std::to_string(rows[i].z()) +
                         ", in the plane it is 0");
+  }
 }
 
 void check_materials(const Model& model, const std::string& where) {
-  for (std::size_t m = 0; m < model.materials.size(); ++m)
+  for (std::size_t m = 0; m < model.materials.size(); ++m) {
     for_each_material_field(model.materials[m],
                             [&](const MaterialField& field, std::span<const double> numbers) {
-                              for (const double number : numbers)
+                              for (const double number : numbers) {
                                 if (!field.range.contains(number))
                                   refuse(where, fmt::format("{}, row {} is {}: {} must be {}", field.dataset,
                                                             m, number, field.key, field.range.words));
+                              }
                             });
+  }
 }
 
 void check_elements(const Mesh& mesh, const std::string& where) {
@@ -57,11 +60,13 @@ void check_elements(const Mesh& mesh, const std::string& where) {
 
 void check_surface(const Model& model, const std::string& where) {
   const auto corners = static_cast<std::size_t>(model.dimension());
-  for (std::size_t at = 0; at < model.surface.size(); at += corners)
-    for (std::size_t i = at; i < at + corners; ++i)
+  for (std::size_t at = 0; at < model.surface.size(); at += corners) {
+    for (std::size_t i = at; i < at + corners; ++i) {
       for (std::size_t j = at; j < i; ++j)
         if (model.surface[i] == model.surface[j])
           refuse(where, "/mesh/surface: row " + std::to_string(at / corners) + " has the same node twice");
+    }
+  }
 }
 
 void check_stored_nodes(const Model& model, const std::string& where) {

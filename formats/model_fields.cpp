@@ -145,10 +145,11 @@ namespace {
 
 std::vector<double> material_values(const Model& model, std::string_view dataset) {
   std::vector<double> values;
-  for (const Material& material : model.materials)
+  for (const Material& material : model.materials) {
     for_each_material_field(material, [&](const MaterialField& field, std::span<const double> numbers) {
       if (field.dataset == dataset) values.insert(values.end(), numbers.begin(), numbers.end());
     });
+  }
   return values;
 }
 
@@ -156,11 +157,12 @@ void put_material_values(Model& model, std::string_view dataset, std::size_t wid
                          const std::vector<double>& values) {
   model.materials.resize(values.size() / width);
   auto value = values.begin();
-  for (Material& material : model.materials)
+  for (Material& material : model.materials) {
     for_each_material_field(material, [&](const MaterialField& field, std::span<double> numbers) {
       if (field.dataset == dataset)
         for (double& number : numbers) number = *value++;
     });
+  }
 }
 
 }  // namespace

@@ -315,10 +315,11 @@ Contents contents_of(const std::filesystem::path& path) {
   FileDescriptor bytes = open_file(path, OpenMode::read);
   std::string start(mcap::magic.size(), '\0');
   start.resize(read_some(bytes, std::as_writable_bytes(std::span(start)), 0));
-  if (start == mcap::magic)
+  if (start == mcap::magic) {
     throw Error(
         "is a recording, not a model", path.string(),
         "palpate-runtime view " + shell_word(path.string()) + " shows it; a model is a NAME.palpate.hdf");
+  }
   return Contents::read(std::move(bytes));
 }
 

@@ -30,16 +30,16 @@ class RecordingChecker {
     if (possible) return;
     throw Error(std::string(topic) + ", row " + std::to_string(row) + ": " + name + " is " +
                     std::to_string(value) + ", which is not " + needed,
-                where_, again_);
+                where_, again);
   }
   void expect_whole(bool whole, const char* topic, std::size_t row) const {
     if (!whole)
       throw Error(std::string(topic) + ", row " + std::to_string(row) + ": is no whole message", where_,
-                  again_);
+                  again);
   }
 
  private:
-  static constexpr const char* again_ = "Copy the file again, or record the session again";
+  static constexpr const char* again = "Copy the file again, or record the session again";
   std::string where_;
 };
 
@@ -55,10 +55,11 @@ constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 /// Throws Error saying what a file with an index is: a model, or an export of a recording.
 [[noreturn]] void refuse_indexed(const std::filesystem::path& path) {
   const std::string format = Contents::read(path).text_attribute("/", "format").value_or("");
-  if (format == "palpate")
+  if (format == "palpate") {
     throw Error(
         "is a model, not a recording", path.string(),
         "palpate-runtime play " + shell_word(path.string()) + " --view shows it and lets you push it");
+  }
   if (format == "palpate-recording")
     throw Error("is HDF5, which palpate-runtime export --hdf5 makes of a recording", path.string(),
                 "Give the recording that it was made of, SESSION.mcap");

@@ -211,10 +211,11 @@ class FieldOfLeaves {
     }
     // Rows of the pair, or of a leaf with itself, are the requested columns.
     const std::int64_t width = width_of(leaf);
-    for (const Source& s : sources)
+    for (const Source& s : sources) {
       for (int axis = 0; axis < D; ++axis)
         add(entries + (std::int64_t{D} * s.node - before + axis) * width + first, m.scale * s.f[axis], u,
             static_cast<Index>(count));
+    }
   }
 
   Walk walk_;

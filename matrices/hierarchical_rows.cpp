@@ -37,17 +37,19 @@ class BlockRow {
   void block(Index leaf, Index column, double* block, std::ptrdiff_t stride) const noexcept {
     const HierarchicalMatrix& m = walk_.matrix;
     const std::int64_t in_leaf = std::int64_t{D} * (column - m.tree.begin(leaf)),
-                       row_in_leaf = D * row_in_leaf_;
+                       row_in_leaf = std::int64_t{D} * row_in_leaf_;
     if (near_ >= 0) {
       const float* entries = m.near.get() + m.near_at[at(near_)];
       const bool stored = leaf_ >= leaf;  // else its transpose
       const Index by_rows = stored ? leaf : leaf_;
       const std::int64_t width = std::int64_t{D} * (m.tree.end(by_rows) - m.tree.begin(by_rows));
-      for (int i = 0; i < D; ++i)
-        for (int j = 0; j < D; ++j)
+      for (int i = 0; i < D; ++i) {
+        for (int j = 0; j < D; ++j) {
           block[i * stride + j] =
               m.scale * static_cast<double>(stored ? entries[(row_in_leaf + i) * width + in_leaf + j]
                                                    : entries[(in_leaf + j) * width + row_in_leaf + i]);
+        }
+      }
       return;
     }
     const Index rank = walk_.rank(leaf);

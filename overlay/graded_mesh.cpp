@@ -272,29 +272,28 @@ class GradedBuilder {
     zero_axes_[node] |= coincident >= 0 ? all_axes() : zero;
   }
 
+  [[nodiscard]] bool is_on(const OuterSide& side, const Weights& w) const {
+    for (std::size_t k = 0; k <= d_; ++k) {
+      if ((side.corners >> k & 1U) == 0 && w[static_cast<Eigen::Index>(k)] != 0.0) return false;
+    }
+    return true;
+  }
+
   /// The facet of a cell on an outer side of its element, if it has one.
   void find_on(const OuterSide& side, const GradedCell& cell, std::span<const Index> local,
                const std::array<Weights, 10>& weights) {
-    const auto is_on = [&](const Weights& w) {
-      for (std::size_t k = 0; k <= d_; ++k) {
-        if ((side.corners >> k & 1U) == 0 && w[static_cast<Eigen::Index>(k)] != 0.0) return false;
-      }
-      return true;
-    };
     if (side.is_border) {
       for (std::size_t k = 0; k < local.size(); ++k) {
-        if (is_on(weights[k])) zero_axes_[local[k]] = all_axes();
+        if (is_on(side, weights[k])) zero_axes_[local[k]] = all_axes();
       }
       return;
     }
     const auto body_nodes = mesh_.element_nodes(cell.parent);
     const SideNodes& of_element = element_sides(mesh_.element)[side.number];
-    const std::size_t middles = d_ == 2 ? 1 : 3;
     for (const SideNodes& own :
          element_sides(patch_.local.element == ElementType::tet10 ? ElementType::tet10 : ElementType::tri3)) {
-      bool is_facet = true;
-      for (std::size_t k = 0; k < d_; ++k) is_facet = is_facet && is_on(weights[own[k]]);
-      if (!is_facet) continue;
+      const auto corners = std::span(own).first(d_);
+      if (!std::ranges::all_of(corners, [&](auto k) { return is_on(side, weights[k]); })) continue;
       GradedFacet facet{};
       for (std::size_t k = 0; k < d_; ++k) {
         facet.corners[k] = body_nodes[of_element[k]];
@@ -303,22 +302,28 @@ class GradedBuilder {
         for (std::size_t j = 0; j < d_; ++j)
           facet.weights[k][static_cast<Eigen::Index>(j)] = weights[own[k]][of_element[j]];
       }
-      for (std::size_t k = 0; k < middles; ++k)
+      for (std::size_t k = 0; k < middles(); ++k)
         facet.nodes[d_ + k] =
             d_ == 2 ? middle_.at(std::minmax(facet.nodes[0], facet.nodes[1])) : local[own[3 + k]];
-      for (std::size_t k = 0; k < d_ + middles; ++k) {
-        const Vec3 at = k < d_ ? facet.weights[k]
-                               : Vec3(0.5 * (facet.weights[(k - d_)] + facet.weights[(k - d_ + 1) % d_]));
-        std::vector<std::pair<Index, double>> parts;
-        for (std::size_t j = 0; j < d_; ++j)
-          parts.emplace_back(facet.corners[j], at[static_cast<Eigen::Index>(j)]);
-        offset_[facet.nodes[k]] = rounding_.offset(parts);
-      }
-      for (std::size_t k = 0; k < d_; ++k) patch_.surface.push_back(facet.nodes[k]);
-      for (std::size_t k = 0; k < middles; ++k)
-        patch_.surface.insert(patch_.surface.end(), d_, facet.nodes[d_ + k]);
-      facets_.push_back(facet);
+      add(facet);
     }
+  }
+
+  [[nodiscard]] std::size_t middles() const { return d_ == 2 ? 1 : 3; }  // of a facet's edges
+
+  void add(const GradedFacet& facet) {
+    for (std::size_t k = 0; k < d_ + middles(); ++k) {
+      const Vec3 at = k < d_ ? facet.weights[k]
+                             : Vec3(0.5 * (facet.weights[(k - d_)] + facet.weights[(k - d_ + 1) % d_]));
+      std::vector<std::pair<Index, double>> parts;
+      for (std::size_t j = 0; j < d_; ++j)
+        parts.emplace_back(facet.corners[j], at[static_cast<Eigen::Index>(j)]);
+      offset_[facet.nodes[k]] = rounding_.offset(parts);
+    }
+    for (std::size_t k = 0; k < d_; ++k) patch_.surface.push_back(facet.nodes[k]);
+    for (std::size_t k = 0; k < middles(); ++k)
+      patch_.surface.insert(patch_.surface.end(), d_, facet.nodes[d_ + k]);
+    facets_.push_back(facet);
   }
 
   /// Moves the surface onto the rounding; a middle inside stays in the middle of its edge.
@@ -356,10 +361,11 @@ class GradedBuilder {
 
 GradedMesh make_graded_mesh(const Model& model, const ElementsAtNodes& at, const Rounding& rounding,
                             std::vector<Index> elements, const PatchFocus& focus) {
-  if (traits(model.mesh.element).corners != model.dimension() + 1 || elements.empty())
+  if (traits(model.mesh.element).corners != model.dimension() + 1 || elements.empty()) {
     throw Error("a graded overlay of " + std::to_string(elements.size()) + " elements " +
                     traits(model.mesh.element).name,
                 "make_graded_mesh", "take at least one tri3, tet4 or tet10");
+  }
   return GradedBuilder(model, at, rounding, std::move(elements)).build(focus);
 }
 

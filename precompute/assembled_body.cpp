@@ -61,10 +61,11 @@ MeshedModel mesh_model(const BakeRun& run) {
       description, [&](const std::string& text) { run.progress.begin(text); }, run.options.keep);
   for (const std::string& note : body.notes) run.progress.line("note: " + note);
   for (const std::string& doubt : body.doubts) run.progress.line("warning: " + doubt);
-  if (!can_seal() && !input_files(description).empty())
+  if (!can_seal() && !input_files(description).empty()) {
     run.progress.line(
         "note: this system cannot seal processes (seccomp): those that read the geometry's file may do what "
         "this program may");
+  }
   if (description.scope != Scope::none) run.progress.begin("assembling K");
   MeshedModel meshed{{}, body.surface, nodal_loads(description, body), body.prescribed, body.warning};
   meshed.model = describe_model(description, run.options, std::move(body));

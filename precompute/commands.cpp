@@ -333,10 +333,11 @@ int run_commands(int argc, char** argv) {
       std::fputs(help_page(app, arguments.help).c_str(), stdout);
       return exit_ok;
     }
-    if (app.get_subcommands().empty() && arguments.model.empty())
+    if (app.get_subcommands().empty() && arguments.model.empty()) {
       throw CLI::RequiredError(
           "MODEL.toml, `new`, `join MODEL.toml`, `inspect FILE`, `verify FILE`, `compare A B` or `index "
           "FILE`");
+    }
     if (const auto command = meant(arguments.model, {"new", "join", "inspect", "verify", "compare", "index"});
         command && !std::filesystem::exists(arguments.model))
       throw CLI::ParseError("there is no command '" + arguments.model + "' and no such file",

@@ -109,7 +109,7 @@ std::filesystem::path OutputPaths::add(const std::filesystem::path& path, Output
     if (target == WriteTarget::stream) pipes_.emplace_back(open_stream(path), path);
     return path;
   }
-  const std::filesystem::path file = link_target(path);
+  std::filesystem::path file = link_target(path);
   Known output = known(file, what);
   refuse_inputs(output);
   refuse_outputs(output);

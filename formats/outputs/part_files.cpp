@@ -60,26 +60,30 @@ PartFile read_part(const std::filesystem::path& path) {
 
 void expect_finished(const PartFile& part) {
   const auto& [number, parts, pieces] = *part.frame.part;
-  if (part.done < part.pieces)
+  if (part.done < part.pieces) {
     throw Error(name_of(number, parts) + " is not finished: " + std::to_string(part.done) + " of " +
                     std::to_string(part.pieces) + " columns are there",
                 part.path.string(),
                 "Give --part " + std::to_string(number) + '/' + std::to_string(parts) + " again: it goes on");
+  }
 }
 
 void expect_one_bake(const PartFile& first, const PartFile& other) {
-  if (other.frame.part->parts != first.frame.part->parts)
+  if (other.frame.part->parts != first.frame.part->parts) {
     throw Error("is one of " + std::to_string(other.frame.part->parts) + " parts, and " +
                     first.path.filename().string() + " one of " + std::to_string(first.frame.part->parts),
                 other.path.string(), "Remove the parts that are not wanted");
-  if (other.frame.key != first.frame.key)
+  }
+  if (other.frame.key != first.frame.key) {
     throw Error("is of another model or version than " + first.path.filename().string() +
                     ", or was made on another kind of processor",
                 other.path.string(), "Make both parts again with the same program from the same files");
-  if (other.frame.part->number == first.frame.part->number)
+  }
+  if (other.frame.part->number == first.frame.part->number) {
     throw Error("is " + name_of(other.frame.part->number, other.frame.part->parts) + ", and " +
                     first.path.string() + " is too",
                 other.path.string(), "Name each part once");
+  }
 }
 
 void expect_all(const std::filesystem::path& model, const std::vector<PartFile>& found) {
@@ -118,10 +122,11 @@ std::vector<std::filesystem::path> find_parts(const std::filesystem::path& model
       paths.push_back(name);
     }
   }
-  if (paths.empty())
+  if (paths.empty()) {
     throw Error(
         "there are no parts of it", model.string(),
         "Run palpate-precompute with --part 1/N to N/N first, or name the folders where the parts are");
+  }
   std::sort(paths.begin(), paths.end());
   std::vector<PartFile> found;
   for (const auto& path : paths) {

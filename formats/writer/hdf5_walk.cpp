@@ -173,7 +173,9 @@ class Walk {
     if (kind == H5I_DATASET) describe_dataset(object, described);
     if (kind != H5I_GROUP || depth == deepest) return;
     for (const std::string& name : members_of(object)) {
-      const std::string member = (path == "/" ? path : path + "/") + name;
+      std::string member = path;
+      if (path != "/") member += '/';
+      member += name;
       const Id opened(H5Oopen(object.get(), name.c_str(), H5P_DEFAULT), H5Oclose);
       if (opened.valid()) {
         describe(opened, member, depth + 1);

@@ -374,7 +374,7 @@ void ModelWriter::note(const std::string& line) {
 }
 
 void ModelWriter::finish(const std::vector<Probe>& probes,
-                         std::shared_ptr<const HierarchicalMatrix> compressed, bool keeps) {
+                         const std::shared_ptr<const HierarchicalMatrix>& compressed, bool keeps) {
   for (const StreamedMatrix& matrix : pieces_.matrices()) {
     const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
     if (missing != matrix.done.end()) {

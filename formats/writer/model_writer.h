@@ -103,7 +103,7 @@ class ModelWriter {
   /// and renames. All columns of all matrices, and all near pairs, must have been written. With `keeps`, an
   /// existing PATH is not replaced but an Error.
   void finish(const std::vector<Probe>& probes,
-              std::shared_ptr<const HierarchicalMatrix> compressed = nullptr, bool keeps = false);
+              const std::shared_ptr<const HierarchicalMatrix>& compressed = nullptr, bool keeps = false);
 
   /// Removes PATH.partial and PATH.progress, unless another process began them.
   void discard() noexcept;

@@ -243,10 +243,11 @@ std::pair<Mesh, MeshGroups> read_gmsh(const std::filesystem::path& file) {
     }
     reader.expect(end);
   }
-  if (version == 2)
+  if (version == 2) {
     for (const ElementTraits& kind : element_traits)
       unite_groups(gmsh.mesh.elements[static_cast<std::size_t>(kind.type)],
                    static_cast<std::size_t>(kind.nodes));
+  }
   return to_body(std::move(gmsh.mesh), reader);
 }
 

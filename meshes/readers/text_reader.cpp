@@ -52,7 +52,7 @@ std::string plain(std::string text) {
 
 }  // namespace
 
-TextReader::TextReader(std::filesystem::path file, char comment)
+TextReader::TextReader(const std::filesystem::path& file, char comment)
     : TextReader(file, read_all(file), comment) {}
 
 TextReader::TextReader(std::filesystem::path file, std::string text, char comment)

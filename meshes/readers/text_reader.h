@@ -17,7 +17,7 @@ class TextReader {
  public:
   /// Text from `comment` to the end of its line is skipped ('\0': there are no comments).
   /// Throws Error when the file cannot be read or holds nothing.
-  explicit TextReader(std::filesystem::path file, char comment = '\0');
+  explicit TextReader(const std::filesystem::path& file, char comment = '\0');
   /// Reads `text`, which is in `file`.
   TextReader(std::filesystem::path file, std::string text, char comment);
 

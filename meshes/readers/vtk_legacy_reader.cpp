@@ -245,6 +245,46 @@ void take_regions(std::vector<CellArray> arrays, const Cells& cells, MeshFile& m
     if (cells.tags[cell] != nullptr) *cells.tags[cell] = regions->values[cell];
 }
 
+/// Content of a file, as far as it has been read.
+struct Parts {
+  MeshFile mesh;
+  std::optional<Cells> cells;
+  std::vector<CellArray> arrays;
+  std::optional<std::int64_t> points, of_cells;  // whose data follow
+};
+
+/// Reads the part of the file that a keyword begins. False: no mesh can follow.
+bool read_part(TextReader& reader, const std::string& keyword, Parts& read) {
+  if (keyword == "POINTS") {
+    // The cells were checked against the first list.
+    if (!read.mesh.nodes.empty()) reader.fail("POINTS stands twice in the file");
+    read.mesh.nodes = read_points(reader);
+  } else if (keyword == "CELLS") {
+    read.cells = read_cells(reader, read.mesh.nodes.size());
+  } else if (keyword == "CELL_TYPES") {
+    if (!read.cells) reader.fail("CELL_TYPES stands before CELLS");
+    read_types(reader, *read.cells, read.mesh);
+  } else if (keyword == "CELL_DATA" && read.cells) {
+    const auto cells = std::ssize(read.cells->offsets) - 1;
+    read.of_cells = reader.integer("the number of cells", cells, cells);
+  } else if (keyword == "POINT_DATA") {
+    const auto nodes = std::ssize(read.mesh.nodes);
+    read.points = reader.integer("the number of points", nodes, nodes);
+    read.of_cells.reset();
+  } else if (read.of_cells) {
+    return read_attribute(reader, keyword, *read.of_cells, &read.arrays);
+  } else if (read.points) {
+    return read_attribute(reader, keyword, *read.points, nullptr);
+  } else if (keyword == "FIELD") {
+    read_field(reader, nullptr);
+  } else if (keyword == "METADATA") {
+    skip_metadata(reader);
+  } else {
+    reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
+  }
+  return true;
+}
+
 }  // namespace
 
 std::pair<Mesh, MeshGroups> read_vtk_legacy(const std::filesystem::path& file) {
@@ -255,40 +295,11 @@ std::pair<Mesh, MeshGroups> read_vtk_legacy(const std::filesystem::path& file) {
     reader.fail(fmt::format("the file holds a {:.40}, not an UNSTRUCTURED_GRID", kind),
                 "Save the volume mesh as unstructured grid");
   }
-  MeshFile mesh;
-  std::optional<Cells> cells;
-  std::vector<CellArray> arrays;
-  std::optional<std::int64_t> points, of_cells;  // whose data follow
-  while (!reader.at_end()) {
-    const std::string keyword(reader.word("a keyword"));
-    if (keyword == "POINTS") {
-      // The cells were checked against the first list.
-      if (!mesh.nodes.empty()) reader.fail("POINTS stands twice in the file");
-      mesh.nodes = read_points(reader);
-    } else if (keyword == "CELLS") {
-      cells = read_cells(reader, mesh.nodes.size());
-    } else if (keyword == "CELL_TYPES") {
-      if (!cells) reader.fail("CELL_TYPES stands before CELLS");
-      read_types(reader, *cells, mesh);
-    } else if (keyword == "CELL_DATA" && cells) {
-      of_cells = reader.integer("the number of cells", std::ssize(cells->offsets) - 1,
-                                std::ssize(cells->offsets) - 1);
-    } else if (keyword == "POINT_DATA") {
-      points = reader.integer("the number of points", std::ssize(mesh.nodes), std::ssize(mesh.nodes));
-      of_cells.reset();
-    } else if (of_cells || points) {
-      if (!read_attribute(reader, keyword, of_cells ? *of_cells : *points, of_cells ? &arrays : nullptr))
-        break;
-    } else if (keyword == "FIELD") {
-      read_field(reader, nullptr);
-    } else if (keyword == "METADATA") {
-      skip_metadata(reader);
-    } else {
-      reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
-    }
+  Parts read;
+  while (!reader.at_end() && read_part(reader, std::string(reader.word("a keyword")), read)) {
   }
-  if (cells) take_regions(std::move(arrays), *cells, mesh);
-  return to_body(std::move(mesh), reader);
+  if (read.cells) take_regions(std::move(read.arrays), *read.cells, read.mesh);
+  return to_body(std::move(read.mesh), reader);
 }
 
 }  // namespace palpate

@@ -91,10 +91,11 @@ void SelectedSolverOf<Real>::multiply(std::span<const std::int64_t> dofs, std::i
   const auto row = [&](std::size_t i) {
     return workspace.sweep.X.begin() + position_[static_cast<std::size_t>(dofs[i])] * columns;
   };
-  for (std::size_t i = 0; i < dofs.size(); ++i)
+  for (std::size_t i = 0; i < dofs.size(); ++i) {
     if (dofs[i] >= 0)
       std::transform(row(i), row(i) + columns, f.begin() + static_cast<std::int64_t>(i) * columns, row(i),
                      std::plus<>());
+  }
   sweep(columns, workspace);
   std::fill(u.begin(), u.end(), Real(0));
   for (std::size_t i = 0; i < dofs.size(); ++i)

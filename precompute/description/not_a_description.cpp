@@ -43,18 +43,20 @@ void check_is_description(const std::filesystem::path& path) {
   }
   check_is_read(path);
   const FileKind* const kind = kind_by_name(path);
-  if (kind != nullptr && !kind->geometry.empty())
+  if (kind != nullptr && !kind->geometry.empty()) {
     throw Error(fmt::format("is {}, not a model.toml, which says what it is made of and held by", kind->what),
                 file,
                 "Write a model.toml beside it and give that to palpate-precompute, to begin with:\n" +
                     first_description(path, kind->geometry));
+  }
   if (kind == nullptr &&
       read_all(path, "Give the path of a model.toml", largest_description).find("[geometry]") ==
-          std::string::npos)
+          std::string::npos) {
     throw Error(
         "is neither a description (.toml, with a table [geometry]) nor of a kind that is known", file,
         "give a surface (.stl, .obj, .ply, .off), a labelled image (.nrrd, .nii, .inr), a picture (.png, "
         ".pbm) or a description (.toml); meshio and 3D Slicer make these of many others");
+  }
 }
 
 }  // namespace palpate

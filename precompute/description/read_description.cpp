@@ -55,10 +55,11 @@ Scope read_scope(const TomlTable& storage, int dimension) {
 /// Throws Error for settings that need Green's functions.
 void check_without_greens(const TomlTable& root, const TomlTable& storage) {
   for (const char* key : {"precision", "compression", "tolerance"}) {
-    if (storage.has(key))
+    if (storage.has(key)) {
       storage.fail(key,
                    fmt::format("[storage] {} is about Green's functions, and scope \"none\" keeps none", key),
                    fmt::format("remove {}, or set another scope", key));
+    }
   }
   for (const char* key : {"overlay", "dynamics"}) {
     if (root.has(key))

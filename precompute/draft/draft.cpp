@@ -84,10 +84,11 @@ void use_existing(const std::filesystem::path& file, const std::filesystem::path
   if (has_options)
     throw Error("is there already, and these options are for a new one", description.string(),
                 "give --renew to write it anew, or change it in an editor and give it to palpate-precompute");
-  if (!is_made_from(read_description(description), file))
+  if (!is_made_from(read_description(description), file)) {
     throw Error("was not made from " + printable(file.filename().string()), description.string(),
                 "to use it as it is, palpate-precompute " + shell_word(description.string()) +
                     "; --renew writes it anew from " + shell_word(file.string()));
+  }
   tell(printable(description.string()) + " is there and is used as it is (--renew writes it anew)");
   std::error_code failed;
   const auto shape_time = std::filesystem::last_write_time(file, failed);

@@ -38,10 +38,11 @@ std::optional<LengthUnit> read_unit(std::string_view text) {
 UnitGuess guess_unit(double longest_side) {
   for (const Usual& usual : usual_units) {
     const double length = longest_side * usual.metres;
-    if (length >= usual.shortest && length <= usual.longest)
+    if (length >= usual.shortest && length <= usual.longest) {
       return {{std::string(usual.name), usual.metres},
               fmt::format("the longest side is {:.3g}, which is {} in {}", longest_side, length_text(length),
                           usual.name)};
+    }
   }
   const double metres = std::pow(10.0, -1.0 - std::floor(std::log10(longest_side)));
   return {*read_unit(fmt::format("{}", metres)),

@@ -194,16 +194,18 @@ double check_thickness(const VoxelBody& body, const LabelField& field, const std
     lost[v] = field.holds(body.center(v)) ? 0 : 1;
   }
   const std::size_t lost_voxels = voxels_of_parts(body, lost, told_part);
-  if (static_cast<double>(lost_voxels) > most_lost * voxels)
+  if (static_cast<double>(lost_voxels) > most_lost * voxels) {
     throw Error(
         fmt::format("the image's body is too thin for a mesh: {} of its {:.0f} voxels are in parts that "
                     "are one voxel thick",
                     lost_voxels, voxels),
         where, finer_voxels);
-  if (lost_voxels > 0)
+  }
+  if (lost_voxels > 0) {
     notes.push_back(
         fmt::format("a thin part of the image, {} voxels and one voxel thick, is lost; to keep it, {}",
                     lost_voxels, finer_voxels));
+  }
   return voxels - static_cast<double>(lost_voxels);
 }
 
@@ -214,11 +216,12 @@ void note_volume(const Mesh& mesh, const VoxelBody& body, std::vector<std::strin
   for (Index e = 0; e < mesh.elements(); ++e)
     elements += std::abs(element_volume(mesh.element, element_nodes(mesh, e)));
   const double difference = elements / (voxels * body.spacing.prod()) - 1.0;
-  if (std::abs(difference) > told_difference)
+  if (std::abs(difference) > told_difference) {
     notes.push_back(
         fmt::format("the mesh has {:.1f} % {} volume than the image's body: use a smaller edge_length "
                     "or facet_distance in [mesh]; where the body is few voxels thick, {}",
                     100.0 * std::abs(difference), difference < 0.0 ? "less" : "more", finer_voxels));
+  }
 }
 
 /// Reports each label's volume in the mesh and in the image.

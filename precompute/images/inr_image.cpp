@@ -120,10 +120,11 @@ std::optional<InrHeader> read_header(gzFile_s* stream, const std::string& where)
 template <class T>
 Labels labels_as(std::vector<char>& bytes, bool swapped, const std::optional<ValueRange>& range) {
   std::vector<T> values(bytes.size() / sizeof(T));
-  if (swapped)
+  if (swapped) {
     for (std::size_t at = 0; at < bytes.size(); at += sizeof(T))
       std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(at),
                    bytes.begin() + static_cast<std::ptrdiff_t>(at + sizeof(T)));
+  }
   std::memcpy(values.data(), bytes.data(), bytes.size());
   bytes = {};
   return labels_from(values.size(), range, [&](std::size_t v) { return static_cast<double>(values[v]); });

@@ -126,10 +126,11 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
   if (header.turned > least_turn)
     notes.push_back(fmt::format(
         "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
-  if (header.sheared > 0.0)
+  if (header.sheared > 0.0) {
     notes.push_back(
         fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry, and so is the body",
                     header.sheared));
+  }
   body.file_unit = header.unit;
   body.shear = Mat3::Map(header.shear.data());
   body.sheared_about = body.origin;
@@ -168,18 +169,20 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
                   "its labels are " + occurring);
     }
   }
-  if (merged.empty() && image.range)
+  if (merged.empty() && image.range) {
     throw Error(fmt::format("no voxel of the image has a value from {} to {}", shown(image.range->low),
                             shown(image.range->high)),
                 where,
                 fmt::format("its values go from {} to {}", shown(header.lowest), shown(header.highest)));
+  }
   if (wanted.empty() && merged.empty()) fail_on_blank(where);
-  if (wanted.empty() && !image.regions && merged.size() > 1)
+  if (wanted.empty() && !image.regions && merged.size() > 1) {
     notes.push_back(
         fmt::format("the labels {} are one tissue; for a tissue each write a [[material]] with "
                     "regions = [{}] and so on, to take some of them alone labels = [{}] under "
                     "[geometry]",
                     and_list(merged), merged.front(), merged.front()));
+  }
   return body;
 }
 

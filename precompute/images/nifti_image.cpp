@@ -180,10 +180,11 @@ void check_place(const Dimensions& said, const std::string& where) {
   const std::span<const double> all(said.place);
   const auto used = said.has_matrix ? all.subspan(6) : all.first(said.has_quaternion ? 6 : 0);
   const auto wrong = std::ranges::find_if(used, [](double number) { return !std::isfinite(number); });
-  if (wrong != used.end())
+  if (wrong != used.end()) {
     throw Error(fmt::format("the image's {} has a number that is {}",
                             said.has_matrix ? "sform (srow_x, srow_y, srow_z)" : "qform", *wrong),
                 where, "correct the header");
+  }
 }
 
 }  // namespace

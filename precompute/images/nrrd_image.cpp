@@ -120,10 +120,11 @@ double unit_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::
     if (known == units.end())
       throw Error(fmt::format("the image counts in \"{}\", a unit that is not known", written), where,
                   "say mm, cm, m, um, nm or in under space units of the header");
-    if (unit != 0.0 && unit != known->second)
+    if (unit != 0.0 && unit != known->second) {
       throw Error(fmt::format("the image counts in \"{}\" along one axis and in \"{}\" along another", first,
                               written),
                   where, "write space directions and space origin of the header in one unit");
+    }
     unit = known->second;
     first = written;
   }

@@ -77,13 +77,14 @@ int threads_with_room(int wanted) {
 void take_blas_room(int threads) {
   const std::optional<std::int64_t> free = address_room();
   if (!free) return;
-  if (*free < needed(threads))
+  if (*free < needed(threads)) {
     throw Error(
         fmt::format("{} thread{} of linear algebra need{} {:.0f} MB of address space, {:.0f} MB are left "
                     "by its limit",
                     threads, threads == 1 ? "" : "s", threads == 1 ? "s" : "",
                     static_cast<double>(needed(threads)) / 1e6, static_cast<double>(*free) / 1e6),
         "memory", std::string("Raise the limit (ulimit -v)") + (threads > 1 ? ", or use fewer --jobs" : ""));
+  }
   // OpenBLAS's own allocator, which keeps freed memory for later; other BLAS libraries have none
   const auto take = reinterpret_cast<void* (*)(int)>(::dlsym(RTLD_DEFAULT, "blas_memory_alloc"));
   const auto give_back = reinterpret_cast<void (*)(void*)>(::dlsym(RTLD_DEFAULT, "blas_memory_free"));

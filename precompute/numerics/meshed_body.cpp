@@ -317,34 +317,38 @@ std::vector<std::string> doubts_of(const MeshedBody& body) {
   const auto nodes = static_cast<double>(mesh.nodes.size()), elements = static_cast<double>(mesh.elements());
   const auto held =
       static_cast<double>(std::ranges::count_if(body.fixed, [](std::uint8_t axes) { return axes != 0; }));
-  if (held > most_held * nodes)
+  if (held > most_held * nodes) {
     doubts.push_back(
         fmt::format("{:.0f} % of the nodes are held ({} of {}): the body can hardly give way; hold "
                     "less of it, along another axis or by percent = 1, under [[fixed]]",
                     100.0 * held / nodes, held, nodes));
+  }
   std::vector<std::uint8_t> outside(mesh.nodes.size(), 0);
   for (const Index node : body.surface.nodes) outside[static_cast<std::size_t>(node)] = 1;
   const auto corners = static_cast<std::size_t>(traits(mesh.element).corners);
   double across = 0.0;
-  for (Index e = 0; e < mesh.elements(); ++e)
+  for (Index e = 0; e < mesh.elements(); ++e) {
     across += std::ranges::all_of(mesh.element_nodes(e).first(corners),
                                   [&](Index node) { return outside[static_cast<std::size_t>(node)] != 0; })
                   ? 1.0
                   : 0.0;
-  if (across > most_across * elements && mesh.element != ElementType::tet10)
+  }
+  if (across > most_across * elements && mesh.element != ElementType::tet10) {
     doubts.push_back(
         fmt::format("the body is one element thick ({:.0f} % of its elements have all corners on its "
                     "surface) and bends too stiffly: use element = \"tet10\" or a smaller "
                     "edge_length in [mesh]",
                     100.0 * across / elements));
+  }
   const QualityReport quality = measure_quality(mesh);
-  if (quality.min_shape < least_shape)
+  if (quality.min_shape < least_shape) {
     doubts.push_back(
         fmt::format("an element is all but flat (shape {:.3f}, angles {:.1f} to {:.1f} degrees, at "
                     "({:.4g}, {:.4g}, {:.4g}) m): forces near it are wrong; use another edge_length "
                     "in [mesh], or remesh",
                     quality.min_shape, quality.min_angle, quality.max_angle, quality.worst_centroid.x(),
                     quality.worst_centroid.y(), quality.worst_centroid.z()));
+  }
   return doubts;
 }
 
@@ -374,7 +378,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   }
   const Index first_unused = first_unused_node(body.mesh);
   if (const std::size_t unused = remove_unused_nodes(body.mesh); unused != 0) {
-    if (largest_listed_node(description) > first_unused)
+    if (largest_listed_node(description) > first_unused) {
       throw Error(
           fmt::format("the file has {} nodes that no element uses, and without them the numbers under "
                       "nodes would mean others",
@@ -382,6 +386,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
           where,
           "remove these nodes in the program that wrote the file, and count anew; or select by box, "
           "half_space, sphere, lowest or tag");
+    }
     body.notes.push_back(fmt::format("removed {} nodes that no element uses", unused));
   }
   check_connected(body.mesh, where);

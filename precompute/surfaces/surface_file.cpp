@@ -41,19 +41,21 @@ void add_point(PolygonSoup& soup, const Vec3& x) {
 void check_soup(const PolygonSoup& soup, const std::string& where) {
   for (const PolygonSoup::Point& p : soup.points) {
     for (int axis = 0; axis < 3; ++axis) {
-      if (!(std::abs(p[axis]) <= largest_coordinate))
+      if (!(std::abs(p[axis]) <= largest_coordinate)) {
         throw Error(
             fmt::format(
                 "point {} of {} has a coordinate that is not a finite number or beyond all measure: {}",
                 &p - soup.points.data() + 1, soup.points.size(), shown(p)),
             where, "export the surface again");
+      }
     }
   }
   for (const Polygon& polygon : soup.polygons) {
-    if (std::ranges::any_of(polygon, [&](std::size_t corner) { return corner >= soup.points.size(); }))
+    if (std::ranges::any_of(polygon, [&](std::size_t corner) { return corner >= soup.points.size(); })) {
       throw Error(fmt::format("polygon {} of {} has a corner that is none of the file's {} points",
                               &polygon - soup.polygons.data() + 1, soup.polygons.size(), soup.points.size()),
                   where, export_again);
+    }
   }
   if (soup.polygons.empty())
     throw Error("cannot read a surface from this file: it has no polygons", where,
@@ -96,10 +98,11 @@ std::size_t obj_corner(TextReader& in, std::size_t points) {
   if (error == std::errc::invalid_argument || end != digits.data() + digits.size())
     in.fail_on(word, "the number of a corner");
   const auto count = static_cast<std::int64_t>(points);
-  if (error != std::errc() || number == 0 || number < -count || number > std::numeric_limits<Index>::max())
+  if (error != std::errc() || number == 0 || number < -count || number > std::numeric_limits<Index>::max()) {
     in.fail(fmt::format("a face has the corner {}, which is none of the {} points before it",
                         digits.substr(0, 24), count),
             export_again);
+  }
   return static_cast<std::size_t>(number > 0 ? number - 1 : count + number);
 }
 
@@ -166,10 +169,11 @@ void read_binary_stl(const std::string& bytes, const std::string& where, Polygon
   const std::size_t start = header + sizeof(std::uint32_t);
   const auto count = static_cast<std::size_t>(decoded<std::uint32_t>(bytes.data() + header, false));
   const std::size_t room = (bytes.size() - start) / facet;
-  if (room != count)
+  if (room != count) {
     throw Error(
         fmt::format("the header of this binary STL tells of {} facets, and the file holds {}", count, room),
         where, export_again);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const char* const at = bytes.data() + start + facet * i + 12 * (corner + 1);  // behind the normal

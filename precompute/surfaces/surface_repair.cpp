@@ -118,10 +118,11 @@ void fill_holes(SurfaceMesh& mesh, std::vector<std::string>& repairs) {
     ++filled;
     if (hole.extent > largest.extent) largest = hole;
   }
-  if (filled != 0)
+  if (filled != 0) {
     repairs.push_back(fmt::format("{} filled, the largest {:.3g} units wide with {} edges",
                                   filled == 1 ? "a hole was" : std::to_string(filled) + " holes were",
                                   largest.extent, largest.edges));
+  }
 }
 
 /// Result from a child: a surface, and what was done or is still wrong.
@@ -169,11 +170,12 @@ TriangleSurface body_of(std::vector<TriangleSurface> shells, SurfaceParts parts,
                  inside = volume / (volume + enclosed_volume(others));
     const std::string share =
         fmt::format("{:.3g} % of the area and {:.3g} % of the volume", 100.0 * surface, 100.0 * inside);
-    if (parts == SurfaceParts::most && std::min(surface, inside) < least_share)
+    if (parts == SurfaceParts::most && std::min(surface, inside) < least_share) {
       throw Error(
           fmt::format("of {} parts the largest has only {}", count, share), where,
           "give palpate-precompute --parts all, which unites parts that overlap or nearly touch, or --parts "
           "largest for that part alone; or join them in a mesh editor");
+    }
     repairs.push_back(fmt::format("of {} parts the largest was kept, {}", count, share));
   }
   repairs.insert(repairs.end(), filled.begin(), filled.end());

@@ -45,11 +45,12 @@ std::string in_words(const BestEffort& best_effort, std::int64_t ticks) {
     reasons.push_back(fmt::format("the solver was cut short in {} of them", best_effort.not_converged_ticks));
   if (best_effort.late_ticks > 0)
     reasons.push_back(fmt::format("the body stood still in {} of them", best_effort.late_ticks));
-  if (best_effort.left_out_ticks > 0)
+  if (best_effort.left_out_ticks > 0) {
     reasons.push_back(
         fmt::format("up to {} contact points found no room in {} of them; give it more "
                     "--max-contacts, or a smaller tool",
                     best_effort.most_left_out, best_effort.left_out_ticks));
+  }
   for (std::size_t k = 0; k < reasons.size(); ++k) text += (k == 0 ? ": " : ", ") + reasons[k];
   return text;
 }

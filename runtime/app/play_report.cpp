@@ -31,11 +31,12 @@ void print_tangents(const PatchTangentTelling& telling) {
                     "rings (take another --overlay)",
                     telling.with_inverted, telling.most_inverted));
   }
-  if (telling.failed > 0)
+  if (telling.failed > 0) {
     print_warning(
         fmt::format("{} neo-Hookean patches could not be made: the one before, or a linear one, "
                     "was used",
                     telling.failed));
+  }
   if (telling.last_residual > most_patch_residual) {
     print_warning(
         fmt::format("at the end the neo-Hookean patch was not in balance: {:.2g} of the forces were "
@@ -52,11 +53,12 @@ void print_overlays(const PatchSource& overlays) {
       "contact on an older patch or none\n",
       overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
       counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
-  if (overlays.failed() > 0)
+  if (overlays.failed() > 0) {
     print_warning(
         fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
                     "not belong to its mesh (precompute it again)",
                     overlays.failed()));
+  }
   if (overlays.tangents() != nullptr) print_tangents(overlays.tangents()->telling());
 }
 
@@ -75,11 +77,12 @@ void print_loop(const LoopReport& report, bool fast) {
   }
   say(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
       report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
-  if (report.largest_force_stiffening > noticed_stiffening)
+  if (report.largest_force_stiffening > noticed_stiffening) {
     say(stderr,
         "it pressed the surface in by {:.2g} m then, where the mesh is about {:.1f} times too stiff for so "
         "small a tool\n",
         report.largest_force_depth, report.largest_force_stiffening);
+  }
   if (report.largest_greens_error > 0.0) {
     say(stderr, "compressed Green's functions: forces are off by at most {:.2g} N, at {:.3f} s\n",
         report.largest_greens_error, report.largest_greens_error_time);
@@ -179,11 +182,12 @@ constexpr double most_residual = 1e-3;  // largest one that is not reported
 void print_depth(const DepthTelling& depth) {
   say(stderr, "depth: the body turned by up to {:.3g} degrees, its compliance {} times\n",
       degrees_a_radian * depth.largest_rotation, depth.turns);
-  if (depth.last_residual > most_residual)
+  if (depth.last_residual > most_residual) {
     print_warning(fmt::format(
         "at the end the body was not in balance: its next step would have changed it by {:.2g} of "
         "its coarse displacement, or it was still moving",
         depth.last_residual));
+  }
 }
 
 void print_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
@@ -199,11 +203,12 @@ void print_live(const Body& body, const LiveTelling& live, const LoopReport& rep
       "it was off by {:.2g} m and {:.2g} N at most, of forces up to {:.3g} N\n",
       live.compliance_age, live.renewals, live.turns, live.largest_error,
       std::max(live.largest_force_error, report.best_effort.largest_late_error), live.largest_force);
-  if (counts.stopped > 0)
+  if (counts.stopped > 0) {
     print_warning(
         fmt::format("in {} steps the solver found no solution however short they were, and stopped the body "
                     "where it was: give it a shorter --live-step, more damping or less load",
                     counts.stopped));
+  }
 }
 
 }  // namespace

@@ -133,10 +133,11 @@ void PictureMaker::show_pressure(std::span<const NodalPress> presses, SurfaceFra
 void PictureMaker::follow_field(const std::vector<float>& field, SurfaceLoad& load,
                                 MotionSnapshot& motion) const {
   const auto dofs = static_cast<std::size_t>(body_.coarse()->dofs());
-  if (field.size() != dofs)
+  if (field.size() != dofs) {
     throw Error("field has " + std::to_string(field.size()) + " numbers, and the body's coarse field " +
                     std::to_string(dofs),
                 "/contacts", "give the model that was recorded");
+  }
   const std::vector<double> q(field.begin(), field.end());
   TwoLevelState state = at_rest(body_.coarse());
   state.H_inverse.setZero();  // q has what the forces move it by

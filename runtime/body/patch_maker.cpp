@@ -75,10 +75,11 @@ std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
   const PatchMesh mesh = this->mesh(centres);
   const CondensedPatch* ready = centres.size() == 1 ? stored(centres[0]) : nullptr;
   if (ready == nullptr) return make_patch(body_, mesh, condense(model, mesh, work_));
-  if (!fits(*ready, mesh, body_.dimension()))
+  if (!fits(*ready, mesh, body_.dimension())) {
     throw Error("the overlay that is stored for node " + std::to_string(body_.mesh_node(centres[0])) +
                     " does not belong to the fine mesh there",
                 model.name, "precompute it again");
+  }
   return make_patch(body_, mesh, *ready);
 }
 

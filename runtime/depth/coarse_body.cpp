@@ -60,12 +60,13 @@ class CoarseBody::Terms {
     for (const std::size_t key : keys_) place_[key] = -1;
     keys_.clear();
     for (const Index point : points) {
-      for (const Index node : fine_.mesh().element_nodes(point / fine_.points()))
+      for (const Index node : fine_.mesh().element_nodes(point / fine_.points())) {
         for_each_key(node, [&](std::size_t key, double) {
           if (place_[key] >= 0) return;
           place_[key] = std::ssize(keys_);
           keys_.push_back(key);
         });
+      }
     }
     for (Index axis = 0; axis < 3; ++axis) {
       for (const std::size_t key : keys_)

@@ -24,10 +24,11 @@ std::int64_t number_of(std::string_view text) {
 int main(int argc, char** argv) {
   return palpate::run_program("palpate-export-hdf5", "export less, by --from and --to", [&] {
     const std::span arguments(argv, static_cast<std::size_t>(argc));
-    if (argc != 6)
+    if (argc != 6) {
       return palpate::tell_usage(
           "RECORDING, OUTPUT, first tick, end of ticks and number of pictures are required",
           "palpate-runtime export RECORDING --hdf5 OUTPUT runs this program");
+    }
     const palpate::RecordingFile recording(arguments[1]);
     const palpate::TickRange ticks{number_of(arguments[3]), number_of(arguments[4])};
     const std::int64_t pictures = number_of(arguments[5]);

@@ -54,7 +54,7 @@ Response page_answer(std::string_view host, const std::string& ancestors, bool f
 
 std::optional<Response> foreign_refusal(const RequestHeader& request, const ServedAddress& served) {
   const std::string_view host = text_view(request[http::field::host]);
-  if (request.count(http::field::host) != 1 || !is_served(host, served.address, served.port))
+  if (request.count(http::field::host) != 1 || !is_served(host, served.address, served.port)) {
     return guarded(plain(
         http::status::forbidden,
         fmt::format(
@@ -63,6 +63,7 @@ std::optional<Response> foreign_refusal(const RequestHeader& request, const Serv
             "refused, as a foreign page could have made them lead here.",
             is_any_address(served.address) ? "an IP address of this machine" : url_host(served.address),
             served.port)));
+  }
   if (request.count(http::field::origin) > 0 && !is_own_page(text_view(request[http::field::origin]), host))
     return guarded(plain(http::status::forbidden, "Pages of other addresses may not ask."));
   return std::nullopt;

@@ -54,10 +54,11 @@ std::string PageArchive::page(std::string_view page) const {
                            base64(deflated(messages_)) + "</script>\n";
   std::string whole(page);
   constexpr std::string_view head = "<head>";
-  if (const std::size_t at = whole.find(head); at != std::string::npos)
+  if (const std::size_t at = whole.find(head); at != std::string::npos) {
     whole.insert(at + head.size(), "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION
                                    "\">\n<meta http-equiv=\"Content-Security-Policy\" content=\"" +
                                        page_policy() + "\">");
+  }
   const std::size_t end = whole.rfind("</body>");
   whole.insert(end == std::string::npos ? whole.size() : end, data);
   return whole;

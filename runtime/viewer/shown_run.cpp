@@ -100,6 +100,8 @@ void ShownRun::obey(Page& page, const PageWord& word) {
     } else {
       word.ask(run_);
     }
+  } catch (const Error& error) {
+    page.say(error_word(word.type, error));
   } catch (const std::exception&) {  // e.g. out of memory: the run goes on
     page.say(error_word(word.type, handled_error("", "close other programs")));
   }

@@ -68,10 +68,11 @@ PackedGreens solve_all(const Factor& factor, std::span<const std::int64_t> dofs)
     solver.solve(dofs.subspan(static_cast<std::size_t>(first)),
                  dofs.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count)),
                  workspaces[static_cast<std::size_t>(worker)], columns);
-    for (std::int64_t j = 0; j < count; ++j)
+    for (std::int64_t j = 0; j < count; ++j) {
       for (std::int64_t i = j; i < n - first; ++i)
         packed[packed_index(first + i, first + j, n)] =
             static_cast<float>(columns[static_cast<std::size_t>(i * count + j)]);
+    }
   });
   return {std::shared_ptr<const void>(packed, packed.get()), n, Precision::single_precision};
 }

@@ -64,9 +64,11 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
   };
   set_cells([](std::size_t lattice) { return static_cast<Index>(lattice); });
   for (const Vec3& x : points)  // the nodes of cells that hold some
+  {
     for_each_node(place(x), [&](Index node, double, const Vec3&) {
       if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = nodes_++;
     });
+  }
   set_cells([&](std::size_t lattice) { return number[lattice]; });
 }
 

@@ -100,7 +100,7 @@ std::vector<Index> same_nodes() {
 Rows dense_block(const std::vector<Index>& nodes) {
   const std::vector<Index> same = same_nodes();
   Rows C(3 * std::ssize(nodes), 3 * std::ssize(nodes));
-  for (Eigen::Index i = 0; i < C.rows(); ++i)
+  for (Eigen::Index i = 0; i < C.rows(); ++i) {
     for (Eigen::Index j = 0; j < C.cols(); ++j) {
       const auto dof = [&](Eigen::Index k) {
         return 3 * std::int64_t{same[static_cast<std::size_t>(nodes[static_cast<std::size_t>(k / 3)])]} +
@@ -108,6 +108,7 @@ Rows dense_block(const std::vector<Index>& nodes) {
       };
       C(i, j) = packed().greens(dof(i), dof(j));
     }
+  }
   return C;
 }
 
@@ -135,10 +136,11 @@ TEST(Compressed, EntriesAreThoseOfThePackedMatrix) {
                            (dense(of(row), of(column)).cwiseAbs().array() + 1e-12))
                               .maxCoeff());
   }
-  for (Eigen::Index i = 0; i < dense.rows(); ++i)
+  for (Eigen::Index i = 0; i < dense.rows(); ++i) {
     for (Eigen::Index j = 0; j < dense.cols(); ++j)
       if (dense(i, i) > 0.0 && dense(j, j) > 0.0)
         far = std::max(far, std::abs(difference(i, j)) / std::sqrt(dense(i, i) * dense(j, j)));
+  }
   EXPECT_LE(near, 1.3e-7) << "entries of near pairs are rounded to single";
   EXPECT_LE(far, 1e-3);
   EXPECT_GT(far, 1e-9) << "nothing was compressed";
@@ -167,10 +169,11 @@ TEST(Compressed, ForcesOfTouchesAreWithinTheTolerance) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> entry(-1.0, 1.0);
   std::vector<Index> free;
-  for (Index k = 0; k < static_cast<Index>(compressed().stored_nodes.size()); ++k)
+  for (Index k = 0; k < static_cast<Index>(compressed().stored_nodes.size()); ++k) {
     if (compressed()
             .fixed[static_cast<std::size_t>(compressed().stored_nodes[static_cast<std::size_t>(k)])] == 0)
       free.push_back(k);
+  }
   double worst = 0.0;
   for (const std::size_t count : {2U, 10U, 60U}) {
     for (int touch = 0; touch < 10; ++touch) {

@@ -47,10 +47,11 @@ struct Body {
 
   [[nodiscard]] Rows expected(const Dofs& rows, const Dofs& columns) const {
     Rows block = Rows::Zero(std::ssize(rows), std::ssize(columns));
-    for (std::size_t i = 0; i < rows.size(); ++i)
+    for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t j = 0; j < columns.size(); ++j)
         if (rows[i] >= 0 && columns[j] >= 0)
           block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = inverse(rows[i], columns[j]);
+    }
     return block;
   }
   [[nodiscard]] Rows solved(const Dofs& rows, const Dofs& columns,

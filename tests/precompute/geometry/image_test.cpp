@@ -267,10 +267,11 @@ TEST_F(ImageMesh, CavitiesStayEmpty) {
 /// A block of 10 x 10 x 6 voxels with a plate of one voxel on it, so long.
 TestImage block_with_fin(int length) {
   TestImage image({40, 20, 20}, {1, 1, 1});
-  for (int k = 0; k < 20; ++k)
+  for (int k = 0; k < 20; ++k) {
     for (int j = 4; j < 14; ++j)
       for (int i = 4; i < 4 + length; ++i)
         if ((k >= 4 && k < 10 && i < 14) || k == 4) image(i, j, k) = 1;
+  }
   return image;
 }
 
@@ -299,10 +300,11 @@ TEST_F(ImageMesh, ThinPartsAndVolumeThatAreLostAreTold) {
 TEST_F(ImageMesh, SmallBodiesKeepTheirVolume) {
   TestImage image({19, 19, 19}, {1, 1, 1});
   double voxels = 0.0;
-  for (int k = 0; k < 19; ++k)
+  for (int k = 0; k < 19; ++k) {
     for (int j = 0; j < 19; ++j)
       for (int i = 0; i < 19; ++i)
         if (Vec3(i - 9, j - 9, k - 9).norm() < 4.6) voxels += image(i, j, k) = 1;
+  }
   MeshOptions options = edges(0.7);
   options.facet_distance = 0.05;
   EXPECT_NEAR(volume(mesh(image, options)), voxels, 0.05 * voxels);  // smoothing alone takes 15 %
@@ -318,10 +320,11 @@ TEST(DistanceField, FlatSidesMoveByAsMuchAsIsMissing) {
   DistanceField field(box, box.inside);
   field.grow_to(512.0);
   double samples = 0.0;
-  for (int k = 0; k < 112; ++k)
+  for (int k = 0; k < 112; ++k) {
     for (int j = 0; j < 112; ++j)
       for (int i = 0; i < 112; ++i)
         samples += field((Vec3(i, j, k) + Vec3::Constant(0.5)) / 8.0 - Vec3::Constant(0.5)) > 0.0 ? 1.0 : 0.0;
+  }
   EXPECT_NEAR(samples / 512.0, 512.0, 8.0);
 }
 

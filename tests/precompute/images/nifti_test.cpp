@@ -82,10 +82,11 @@ std::array<std::array<double, 4>, 3> matrix_of(const Layout& layout) {
   columns = turn * columns / layout.unit;
   corner = turn * corner / layout.unit;
   std::array<std::array<double, 4>, 3> rows{};
-  for (std::size_t r = 0; r < 3; ++r)
+  for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t c = 0; c < 4; ++c)
       rows.at(r).at(c) =
           c < 3 ? columns(static_cast<int>(r), static_cast<int>(c)) : corner[static_cast<int>(r)];
+  }
   return rows;
 }
 
@@ -140,8 +141,8 @@ std::string nifti(const Layout& layout) {
     const auto axis = static_cast<std::size_t>(layout.axis.at(s));
     at.at(axis) = layout.backwards.at(s) ? size.at(axis) - 1 - number : number;
   };
-  for (int c = 0; c < dim[3]; ++c)
-    for (int b = 0; b < dim[2]; ++b)
+  for (int c = 0; c < dim[3]; ++c) {
+    for (int b = 0; b < dim[2]; ++b) {
       for (int a = 0; a < dim[1]; ++a) {
         run(0, a);
         run(1, b);
@@ -151,6 +152,8 @@ std::string nifti(const Layout& layout) {
         if (layout.datatype == 4) file.add(static_cast<std::int16_t>(value));
         if (layout.datatype == 16) file.add(static_cast<float>(value));
       }
+    }
+  }
   return file.bytes();
 }
 
@@ -189,8 +192,8 @@ TEST_F(NiftiImage, LiesInSpaceAsItsMatrixSays) {
 }
 
 TEST_F(NiftiImage, OfEachKindIsTheSame) {
-  for (const int version : {1, 2})
-    for (const bool swapped : {false, true})
+  for (const int version : {1, 2}) {
+    for (const bool swapped : {false, true}) {
       for (const int datatype : {2, 4, 16}) {
         Layout layout;
         layout.version = version;
@@ -199,6 +202,8 @@ TEST_F(NiftiImage, OfEachKindIsTheSame) {
         SCOPED_TRACE(testing::at(version * 100 + datatype));
         expect_same(read("a.nii", nifti(layout)));
       }
+    }
+  }
 }
 
 TEST_F(NiftiImage, HasLengthsInMillimetresAndScaledValues) {

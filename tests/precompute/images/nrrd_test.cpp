@@ -60,14 +60,16 @@ std::string voxels(const Layout& layout) {
     at.at(axis) = layout.backwards.at(s) ? test::size.at(axis) - 1 - count : count;
   };
   std::string bytes;
-  for (int c = 0; c < test::size.at(layout.axis[2]); ++c)
-    for (int b = 0; b < test::size.at(layout.axis[1]); ++b)
+  for (int c = 0; c < test::size.at(layout.axis[2]); ++c) {
+    for (int b = 0; b < test::size.at(layout.axis[1]); ++b) {
       for (int a = 0; a < test::size.at(layout.axis[0]); ++a) {
         run(0, a);
         run(1, b);
         run(2, c);
         bytes += number(layout, label_at(at[0], at[1], at[2]));
       }
+    }
+  }
   return bytes;
 }
 
@@ -159,7 +161,7 @@ TEST_F(NrrdImage, LiesInSpaceAsItsDirectionsSay) {
 }
 
 TEST_F(NrrdImage, OfEachKindIsTheSame) {
-  for (const bool big_endian : {false, true})
+  for (const bool big_endian : {false, true}) {
     for (const char* const type : {"uint8", "short", "float", "unsigned long long"}) {
       Layout layout;
       layout.big_endian = big_endian;
@@ -167,6 +169,7 @@ TEST_F(NrrdImage, OfEachKindIsTheSame) {
       SCOPED_TRACE(type);
       expect_same(read("a.nrrd", nrrd(layout)));
     }
+  }
 }
 
 TEST_F(NrrdImage, HasLengthsInItsUnits) {
@@ -239,9 +242,9 @@ TEST_F(NrrdImage, VoxelsInAnotherFileAreRefused) {
   const std::string other = folder_.write("other.raw", voxels({})).string();
   for (const std::string field :
        {"data file: ", "Data File: ", "DATA FILE: ", "datafile: ", "DataFile: ", "DATAFILE: ", "data  file: ",
-        " data file: ", "data file : ", "data_file: ", "data-file: ", "data file:\t", "Data File:"})
+        " data file: ", "data file : ", "data_file: ", "data-file: ", "data file:\t", "Data File:"}) {
     for (const std::string& file : {other, std::string("/etc/passwd"), std::string("LIST"),
-                                    std::string("LIST 3"), std::string("slice%03d.raw 1 9 1")})
+                                    std::string("LIST 3"), std::string("slice%03d.raw 1 9 1")}) {
       for (const char* const encoding : {"raw", "gzip", "gz", "hex", "ascii", "txt", "bzip2"}) {
         Layout detached;
         detached.before = field + file + "\n" + (file == other ? "" : "byte skip: -1\n");
@@ -249,6 +252,8 @@ TEST_F(NrrdImage, VoxelsInAnotherFileAreRefused) {
         expect_mentions(error(header(detached, encoding) + std::string(2000, '1')),
                         {"another file", "one file"});
       }
+    }
+  }
 }
 
 TEST_F(NrrdImage, WrittenInDigitsIsTheSameAndCountedBefore) {

@@ -127,10 +127,11 @@ TEST_F(TwoLevelBar, FeelsAsTheWholeBodyWhereItBucklesAndBends) {
     const double error = (sum(f) - truth).norm() / truth.norm(),
                  of_linear = (Xi.inverse() * to - truth).norm() / truth.norm();
     double off = 0.0;
-    for (std::size_t k = 0; k < model.stored_nodes.size(); ++k)
+    for (std::size_t k = 0; k < model.stored_nodes.size(); ++k) {
       off = std::max(off, (vector_at(levels.displacement(), 3, static_cast<Index>(k)) -
                            whole.displacement(model.stored_nodes[k]))
                               .norm());
+    }
     std::printf("tip at (%g, %g) mm: %.4g N, two levels %.2f %% off, small strain %.0f %%; surface %.2f %%\n",
                 1e3 * to.x(), 1e3 * to.z(), truth.norm(), 100.0 * error, 100.0 * of_linear,
                 100.0 * off / to.norm());

@@ -506,10 +506,11 @@ TEST_P(WholeMeshContact, GivesTheSameForcesAndDisplacements) {
   Eigen::VectorXd f = Eigen::VectorXd::Zero(mesh.dofs());
   for (std::size_t k = 0; k < state.surface.near.load().nodes().size(); ++k) {
     const Index node = body.mesh_node(state.surface.near.load().nodes()[k]);
-    for (int axis = 0; axis < d; ++axis)
+    for (int axis = 0; axis < d; ++axis) {
       f[Eigen::Index{d} * node + axis] =
           state.surface.near.load()
               .forces()[static_cast<std::size_t>(d) * k + static_cast<std::size_t>(axis)];
+    }
   }
   const Eigen::VectorXd f_direct = mesh.force(direct.u);
   EXPECT_LE((f - f_direct).lpNorm<Eigen::Infinity>(), 1e-6 * f_direct.lpNorm<Eigen::Infinity>());

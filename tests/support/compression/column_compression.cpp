@@ -160,21 +160,23 @@ ColumnCompression::Front ColumnCompression::compress_leaf(Index c, Index tile, D
   const auto of = [&](Index row) { return corner + (first_dof(row) - first) * width; };
   Rows gram = Rows::Zero(n, n);
   const std::vector<HierarchicalMatrix::Pair> pairs = later_pairs(c);
-  for (const auto& [row, pair] : pairs)
+  for (const auto& [row, pair] : pairs) {
     cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, static_cast<blasint>(n),
                 static_cast<blasint>(dofs(row)), 1.0, of(row), static_cast<blasint>(width), 1.0, gram.data(),
                 static_cast<blasint>(n));
+  }
   column_basis_[at(c)] =
       leading(gram.selfadjointView<Eigen::Lower>(), cut * cut * double(n) * compliance_[at(c)]);
   const Rows V = column_basis_[at(c)];
   Front front;
   for (const auto& [row, pair] : pairs) {
     Rows rows(dofs(row), V.cols());
-    if (V.cols() > 0)
+    if (V.cols() > 0) {
       cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, static_cast<blasint>(dofs(row)),
                   static_cast<blasint>(V.cols()), static_cast<blasint>(n), 1.0, of(row),
                   static_cast<blasint>(width), V.data(), static_cast<blasint>(V.cols()), 0.0, rows.data(),
                   static_cast<blasint>(V.cols()));
+    }
     front.rows.push_back(rows.cast<float>());
   }
   return front;
