@@ -340,7 +340,7 @@ void SparseCholesky::substitute_back(auto& y) const {
 
 template <class Columns>
 Columns SparseCholesky::solve_columns(const Columns& b) const {
-  Columns x(b.rows(), b.cols()), y(b.rows(), b.cols());
+  Columns x(b.rows(), b.cols()), y = Columns::Zero(b.rows(), b.cols());
   for (int k = 0; k < b.rows(); ++k) y.row(position_[at(k)]) = b.row(k);
   for (const Supernode& supernode : supernodes_) {
     const int* rows = rows_.data() + supernode.rows_at + supernode.columns;

@@ -61,7 +61,7 @@ RankTeam::RankTeam() : rank_(rank_in(MPI_COMM_WORLD)), size_(size_of(MPI_COMM_WO
   MPI_Comm_free(&node);
   constexpr int bytes = sizeof(std::int64_t);
   void* memory = nullptr;
-  MPI_Win_allocate(leads() ? bytes : 0, bytes, MPI_INFO_NULL, MPI_COMM_WORLD, &memory, &counter_);
+  MPI_Win_allocate(RankTeam::leads() ? bytes : 0, bytes, MPI_INFO_NULL, MPI_COMM_WORLD, &memory, &counter_);
   MPI_Win_lock_all(MPI_MODE_NOCHECK, counter_);
 }
 

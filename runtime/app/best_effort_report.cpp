@@ -21,6 +21,7 @@ std::string percent(double share) {
 nlohmann::ordered_json to_json(const BestEffort& best_effort) {
   return {{"ticks", best_effort.ticks},
           {"not_converged_ticks", best_effort.not_converged_ticks},
+          {"unbalanced_ticks", best_effort.unbalanced_ticks},
           {"left_out_ticks", best_effort.left_out_ticks},
           {"late_ticks", best_effort.late_ticks},
           {"most_left_out", best_effort.most_left_out},
@@ -43,6 +44,10 @@ std::string in_words(const BestEffort& best_effort, std::int64_t ticks) {
   std::vector<std::string> reasons;
   if (best_effort.not_converged_ticks > 0)
     reasons.push_back(fmt::format("the solver was cut short in {} of them", best_effort.not_converged_ticks));
+  if (best_effort.unbalanced_ticks > 0) {
+    reasons.push_back(
+        fmt::format("the balance at depth was not met in {} of them", best_effort.unbalanced_ticks));
+  }
   if (best_effort.late_ticks > 0)
     reasons.push_back(fmt::format("the body stood still in {} of them", best_effort.late_ticks));
   if (best_effort.left_out_ticks > 0) {

@@ -26,6 +26,17 @@ std::unique_ptr<MotionStepper> make_stepper(const Body& body, int jobs) {
   return std::make_unique<PackedMotion>(body, jobs);
 }
 
+/// Adds the error of the last job's forces to the tools' force_error.
+void note_imbalance(State& state) noexcept {
+  const double error = state.surface.motion.force_error();
+  if (error == 0.0) return;
+  for (ToolState& tool : state.tools) {
+    if (tool.contacts == 0) continue;
+    tool.force_error += error * tool.contact_wrench.force.norm();
+    state.status |= StepStatus::unbalanced;
+  }
+}
+
 }  // namespace
 
 MotionSource::MotionSource(const Body& body, const State& state, const MotionSourceOptions& options)
@@ -82,6 +93,7 @@ void MotionSource::note_standing_still(State& state) noexcept {
 
 void MotionSource::post(State& state) noexcept {
   note_standing_still(state);
+  note_imbalance(state);
   const MotionJob& job = state.surface.motion.job();
   if (!state.surface.motion.active()) return;
   const bool is_new = job.step != posted_step_;
@@ -129,6 +141,7 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   sample.let_go = job.let_go;
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
   sample.compliance = stepper_->compliance();
+  sample.force_error = stepper_->force_error();
   stepper_->tell_untouched(sample.untouched);
   stepper_->tell_shift(sample.shift);
   let_go_done_ = job.let_go;

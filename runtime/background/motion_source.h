@@ -36,7 +36,7 @@ class MotionSource {
   /// background.
   void receive(State& state, std::int64_t step) noexcept;
   /// Posts the job of a tick. Adds to the tools' force_error the change of their forces since the body stood
-  /// still, if it should have moved (live, or dynamic contact).
+  /// still, if it should have moved (live, or dynamic contact), or the error of the last job's forces.
   void post(State& state) noexcept;
 
   [[nodiscard]] std::int64_t steps() const noexcept { return steps_; }     ///< steps so far

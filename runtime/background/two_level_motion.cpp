@@ -17,7 +17,9 @@ constexpr double most_residual = 1e-2;  // of a balance that is used
 constexpr int most_failures = 5;        // until the search begins anew
 constexpr double most_of_cell = 0.3;    // of its edge, that a node moves in a job
 constexpr double most_behind = 0.03;    // [rad] by which W may lag
-constexpr double most_wrong = 0.1;      // error of W, as a fraction of a step's displacement of loaded nodes
+constexpr double most_wrong = 0.03;     // error of W, as a fraction of a step's displacement of loaded nodes
+constexpr double felt_error = 0.05;     // of the force: hands discern 7 % (Jones 1989)
+constexpr double least_error = 0.01;    // of the largest force so far: at first and last touch
 constexpr std::size_t nodes_beside = 60;   // that a tool comes to meet until the next job
 constexpr double least_wrong = tolerance;  // fraction of their displacement below which it is negligible
 
@@ -44,6 +46,7 @@ void TwoLevelMotion::rest() noexcept {
   std::fill(R_renewed_.begin(), R_renewed_.end(), Mat3::Identity());
   renewed_ = mesh_ = nullptr;
   failures_ = 0;
+  force_error_ = largest_force_ = 0.0;
   for (std::vector<double>* all : {&x_, &x_before_, &without_}) std::fill(all->begin(), all->end(), 0.0);
   const std::lock_guard lock(mutex_);
   telling_ = {};
@@ -108,11 +111,24 @@ TwoLevelReport TwoLevelMotion::find() {
   return report;
 }
 
+/// Difference of the tick's force from the balance's for the same places, as a fraction, if a hand feels it.
+double TwoLevelMotion::find_force_error() {
+  const int d = body_.dimension();
+  Vec3 in_tick = Vec3::Zero(), in_balance = Vec3::Zero();
+  for (Index k = 0; k < std::ssize(nodes_); ++k) in_tick += vector_at(f_, d, k);
+  for (Index k = 0; k < std::ssize(levels_.loaded()); ++k) in_balance += vector_at(levels_.forces(), d, k);
+  const double error = (in_tick - in_balance).norm(), force = in_tick.norm();
+  largest_force_ = std::max(largest_force_, in_balance.norm());
+  const bool is_felt = error > felt_error * force && error > least_error * largest_force_;
+  return is_felt ? std::min(1.0, error / force) : 0.0;
+}
+
 void TwoLevelMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
   std::swap(x_, x_before_);
   try {
     take_load(job);
     const TwoLevelReport report = find();
+    force_error_ = find_force_error();
     const auto of_field = std::copy(levels_.displacement().begin(), levels_.displacement().end(), x_.begin());
     std::copy(levels_.field().begin(), levels_.field().end(), of_field);
     shift_.clear();
@@ -132,7 +148,7 @@ bool TwoLevelMotion::must_renew() const {
   for (std::size_t node = 0; node < R_renewed_.size(); ++node)
     behind = std::max(behind, half_sine(levels_.turns()[node].R, R_renewed_[node]));
   if (behind > 0.5 * most_behind) return true;
-  if (renewed_ == nullptr || nodes_.empty()) return false;
+  if (nodes_.empty()) return false;
   // Where the tick would have had the loaded nodes.
   std::vector<NodeRange> ranges;
   for (const Index node : nodes_) ranges.push_back({node, node + 1});

@@ -33,6 +33,7 @@ class TwoLevelMotion final : public MotionStepper {
   void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept override;
   [[nodiscard]] std::shared_ptr<const Greens> compliance() const noexcept override { return renewed_; }
 
+  [[nodiscard]] double force_error() const noexcept override { return force_error_; }
   void tell_shift(std::vector<double>& shift) const noexcept override { shift = shift_; }
 
   [[nodiscard]] DepthTelling telling() const;  ///< for any thread
@@ -45,6 +46,7 @@ class TwoLevelMotion final : public MotionStepper {
   void find_by_load(const Greens& W, std::vector<double>& u) const;
   void take_load(const MotionJob& job);
   TwoLevelReport find();
+  [[nodiscard]] double find_force_error();
   [[nodiscard]] bool must_renew() const;
   [[nodiscard]] std::vector<Index> near_nodes() const;
   void renew();
@@ -55,6 +57,8 @@ class TwoLevelMotion final : public MotionStepper {
   std::shared_ptr<const Greens> field_at_rest_;  // for its coarse displacement
   TwoLevels levels_;
   int failures_ = 0;                // searches in a row that found no balance
+  double force_error_ = 0.0;        // of the job, as a fraction of its force; 0: not felt
+  double largest_force_ = 0.0;      // since rest [N]
   std::vector<Index> nodes_;        // loaded in the job, each once
   std::vector<double> f_, places_;  // [d nodes_] their forces and displacements in the tick
   std::vector<Mat3> R_renewed_;     // [stored] rotations of W

@@ -62,12 +62,9 @@ CoarseAt coarse_at(const CoarseNodes& nodes, Index node, std::span<const double>
   CoarseAt at;
   const int d = nodes.field.dimension();
   const unsigned axes = nodes.axes[static_cast<std::size_t>(node)];
-  nodes.field.for_each_node(nodes.place[static_cast<std::size_t>(node)],
-                            [&](Index k, double weight, const Vec3& gradient) {
-                              const Vec3 part = vector_at(q, d, k);
-                              at.F += part * gradient.transpose();
-                              at.moved += weight * part;
-                            });
+  const CoarseValue value = nodes.field.value(nodes.place[static_cast<std::size_t>(node)], q);
+  at.F += value.gradient;
+  at.moved = value.u;
   for (int axis = 0; axis < 3; ++axis)
     if (((axes >> axis) & 1U) == 0) at.moved[axis] = 0.0;
   if (nodes.turns(node)) at.R = d == 3 ? nearest_rotation(at.F) : nearest_rotation_in_plane(at.F);

@@ -44,7 +44,8 @@ static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
 static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
 static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
 static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
-static_assert(status_names.size() == 13, "these");
+static_assert(same(PALPATE_UNBALANCED, StepStatus::unbalanced));
+static_assert(status_names.size() == 14, "these");
 
 constexpr int most_contacts = 256;  // the compliance between the nodes near them takes up to 90 MB
 

@@ -82,6 +82,7 @@ enum palpate_status {
   PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
   PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not there in time */
   PALPATE_RIGID_CONTACT = 1 << 13,    /* a tool presses on what cannot move: only its coupling gives way */
+  PALPATE_UNBALANCED = 1 << 14,       /* the body's balance at depth was not met: see force_error */
   PALPATE_NOT_STEPPED = 1 << 15       /* nothing happened: the session is NULL or has ended, or another thread
                                        * is in its loop */
 };

@@ -32,6 +32,7 @@ void BestEffort::add(StepStatus status, double force, double force_error, std::i
   if (!is_best_effort(status, left_out, force_error)) return;
   ++ticks;
   if (has(status, StepStatus::not_converged)) ++not_converged_ticks;
+  if (has(status, StepStatus::unbalanced)) ++unbalanced_ticks;
   if (left_out > 0) ++left_out_ticks;
   if (has(status, StepStatus::late_motion)) {
     ++late_ticks;
@@ -54,6 +55,7 @@ void BestEffort::add(const BestEffort& later, double time_before) noexcept {
   }
   ticks += later.ticks;
   not_converged_ticks += later.not_converged_ticks;
+  unbalanced_ticks += later.unbalanced_ticks;
   left_out_ticks += later.left_out_ticks;
   most_left_out = std::max(most_left_out, later.most_left_out);
   largest_share = std::max(largest_share, later.largest_share);

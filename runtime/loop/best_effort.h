@@ -27,7 +27,7 @@ class DecadeHistogram {
 };
 
 /// True if the force of a tick is a best effort: the solver was stopped early, contact points pressed by the
-/// tool exceeded the capacity, or a time-dependent body was not stepped.
+/// tool exceeded the capacity, a time-dependent body was not stepped, or its balance not met.
 [[nodiscard]] constexpr bool is_best_effort(StepStatus status, std::int64_t left_out,
                                             double force_error) noexcept {
   return has(status, StepStatus::not_converged) || left_out > 0 || force_error > 0.0;
@@ -46,6 +46,7 @@ struct BestEffort {
 
   std::int64_t ticks = 0;
   std::int64_t not_converged_ticks = 0;  ///< best-effort ticks without convergence
+  std::int64_t unbalanced_ticks = 0;     ///< best-effort ticks in which the balance at depth was not met
   std::int64_t left_out_ticks = 0;       ///< best-effort ticks with contact points left out
   std::int64_t late_ticks = 0;           ///< best-effort ticks in which the body was not stepped
   double largest_late_error = 0.0;       ///< in the late ticks [N]

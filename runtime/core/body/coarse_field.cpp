@@ -63,8 +63,7 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
     }
   };
   set_cells([](std::size_t lattice) { return static_cast<Index>(lattice); });
-  for (const Vec3& x : points)  // the nodes of cells that hold some
-  {
+  for (const Vec3& x : points) {  // the nodes of cells that hold some
     for_each_node(place(x), [&](Index node, double, const Vec3&) {
       if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = nodes_++;
     });
@@ -89,6 +88,45 @@ void CoarseField::drop_dependent(std::span<const Vec3> points) {
   nodes_ = number_independent(gram, kept);
   for (Index& node : node_)
     if (node >= 0) node = kept[static_cast<std::size_t>(node)];
+}
+
+namespace {
+
+/// Polynomials of each axis in turn: a sum over nodes of one axis, of these sums over the next, and so on.
+template <int D>
+CoarseValue value_of(const Index* node, const CoarsePlace& at, const double* q) noexcept {
+  CoarseValue sum;
+  for (int c = 0; c < (D == 3 ? 3 : 1); ++c) {
+    Vec3 plane = Vec3::Zero(), along_x = Vec3::Zero(), along_y = Vec3::Zero();
+    for (int b = 0; b < 3; ++b) {
+      Vec3 line = Vec3::Zero(), slope = Vec3::Zero();
+      for (int a = 0; a < 3; ++a) {
+        const Index number = node[9 * c + 3 * b + a];
+        if (number < 0) continue;
+        const double* q_node = q + std::ptrdiff_t{D} * number;
+        const double value_a = at.value[a].x(), slope_a = at.slope[a].x();
+        for (int axis = 0; axis < D; ++axis) {
+          line[axis] += value_a * q_node[axis];
+          slope[axis] += slope_a * q_node[axis];
+        }
+      }
+      plane += at.value[b].y() * line;
+      along_x += at.value[b].y() * slope;
+      along_y += at.slope[b].y() * line;
+    }
+    sum.u += at.value[c].z() * plane;
+    sum.gradient.col(0) += at.value[c].z() * along_x;
+    sum.gradient.col(1) += at.value[c].z() * along_y;
+    sum.gradient.col(2) += at.slope[c].z() * plane;
+  }
+  return sum;
+}
+
+}  // namespace
+
+CoarseValue CoarseField::value(const CoarsePlace& at, std::span<const double> q) const noexcept {
+  const Index* node = node_.data() + std::ptrdiff_t{at.cell} * 27;
+  return dimension_ == 3 ? value_of<3>(node, at, q.data()) : value_of<2>(node, at, q.data());
 }
 
 CoarsePlace CoarseField::place(const Vec3& x) const noexcept {

@@ -20,6 +20,12 @@ struct CoarsePlace {
   std::array<Vec3, 3> value, slope;
 };
 
+/// Displacement of a coarse field at a place [m], and its gradient [-].
+struct CoarseValue {
+  Vec3 u = Vec3::Zero();
+  Mat3 gradient = Mat3::Zero();
+};
+
 /// Displacement u = P q that is triquadratic in each cell of a grid (Lagrange's hexahedra of 27 nodes,
 /// quadrilaterals of 9 in the plane) and continuous. The grid need not fit a body: a body is embedded in it.
 /// Dof d k + axis of q belongs to coarse node k.
@@ -41,6 +47,9 @@ class CoarseField {
 
   /// Place of a point in the box, or beside it, where the next cell's polynomials go on.
   [[nodiscard]] CoarsePlace place(const Vec3& x) const noexcept;
+
+  /// P q and its gradient.
+  [[nodiscard]] CoarseValue value(const CoarsePlace& at, std::span<const double> q) const noexcept;
 
   /// Calls visit(node, weight, gradient) for each node of the place's cell: P and its gradient [1/m] there.
   template <class Visit>

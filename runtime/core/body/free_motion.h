@@ -53,6 +53,7 @@ struct MotionSample {
   /// [n + n_q] displacement by the job's forces with the compliance before, less that with this one [m];
   /// empty: not known.
   std::vector<double> shift{};
+  double force_error = 0.0;  ///< of the job's forces, as a fraction of them
   /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
 };
@@ -137,7 +138,8 @@ class FreeMotion {
   /// Adds sign * u [n or n + n_q] to the motion until the next sample, to compensate a change of the
   /// displacement by contact forces when their compliance changes. Call after `receive`.
   void take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept;
-  [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }  ///< last sample's
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }   ///< last sample's
+  [[nodiscard]] double force_error() const noexcept { return sampled_.force_error; }  ///< last sample's
   /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && sampled_.job.step > sampled_.step; }
 
@@ -182,6 +184,7 @@ class FreeMotion {
     double last_share = 1.0;        // in the last tick
     double most_change = -1.0;      // from `before` to u, of any dof; negative: not known
     std::vector<double> untouched;  // [n] empty unless live
+    double force_error = 0.0;       // MotionSample::force_error
   };
   struct SurfaceNode {
     std::int64_t stamp = -2;  // tick of the value

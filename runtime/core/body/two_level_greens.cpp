@@ -71,10 +71,12 @@ class TwoLevelGreens final : public GreensOnTop {
     if (P_f.isZero(0.0) && J_f.isZero(0.0)) return;
     respond_to(state_.nodes->compliance, P_f, q_rest);
     respond_to(state_.H_inverse, J_f, q);
+    const std::span<const double> of_q(q.data(), static_cast<std::size_t>(n)),
+        of_rest(q_rest.data(), static_cast<std::size_t>(n));
     Index out = 0;
     for (const NodeRange& range : ranges) {
       for (Index node = range.first; node < range.end; ++node, ++out) {
-        const Vec3 moved_by = moved(node, q).col(0) - at_rest(node, q_rest).col(0);
+        const Vec3 moved_by = moved(node, of_q) - at_rest(node, of_rest);
         set_vector(u, dimension(), out, vector_at(u, dimension(), out) + moved_by);
       }
     }
@@ -131,7 +133,13 @@ class TwoLevelGreens final : public GreensOnTop {
 
   /// Displacement of a node by unit forces along each axis on the node of an answer.
   [[nodiscard]] Mat3 by_answer(Index stored, const Answer& answer) const noexcept {
-    return moved(stored, answer.by_tangent) - at_rest(stored, answer.by_rest);
+    Mat3 block = Mat3::Zero();
+    const auto n = static_cast<std::size_t>(state_.H_inverse.rows());
+    for (Eigen::Index column = 0; column < dimension(); ++column) {
+      block.col(column) = moved(stored, {answer.by_tangent.col(column).data(), n}) -
+                          at_rest(stored, {answer.by_rest.col(column).data(), n});
+    }
+    return block;
   }
   template <class Visit>
   void for_each_block(Index stored, const Visit& visit) const noexcept {
@@ -178,49 +186,29 @@ class TwoLevelGreens final : public GreensOnTop {
     return answer;
   }
 
-  /// R P q of a node for each column of q.
-  template <class Q>
-  [[nodiscard]] Mat3 at_rest(Index stored, const Q& q) const noexcept {
-    Mat3 sum = Mat3::Zero();
-    const Eigen::Index d = dimension();
-    for_each_block(stored, [&](Index node, double weight, const Vec3&) {
-      for (Eigen::Index column = 0; column < q.cols(); ++column)
-        sum.col(column).head(d) += weight * q.col(column).segment(d * node, d);
-    });
-    for (Eigen::Index column = 0; column < q.cols(); ++column)
-      sum.col(column) = state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, sum.col(column));
-    return sum;
+  [[nodiscard]] CoarseValue value(Index stored, std::span<const double> q) const noexcept {
+    return state_.nodes->field.value(state_.nodes->place[static_cast<std::size_t>(stored)], q);
   }
 
-  /// J q of a node for each column of q.
-  template <class Q>
-  [[nodiscard]] Mat3 moved(Index stored, const Q& q) const noexcept {
-    Mat3 sum = Mat3::Zero();
-    const Eigen::Index d = dimension();
+  /// R P q of a node.
+  [[nodiscard]] Vec3 at_rest(Index stored, std::span<const double> q) const noexcept {
+    return state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, value(stored, q).u);
+  }
+
+  /// J q of a node.
+  [[nodiscard]] Vec3 moved(Index stored, std::span<const double> q) const noexcept {
     if (const Index c = column_of_[static_cast<std::size_t>(stored)]; c >= 0) {
       const Eigen::MatrixXd& J = state_.columns[static_cast<std::size_t>(c)].J;
-      for (Eigen::Index column = 0; column < q.cols(); ++column) {
-        for (Eigen::Index i = 0; i < d; ++i) sum(i, column) = J.col(i).dot(q.col(column));
-      }
+      const Eigen::Map<const Eigen::VectorXd> all(q.data(), std::ssize(q));
+      Vec3 sum = Vec3::Zero();
+      for (Eigen::Index i = 0; i < dimension(); ++i) sum[i] = J.col(i).dot(all);
       return sum;
     }
-    std::array<Mat3, 3> slope;  // gradient of the field, for each column
-    slope.fill(Mat3::Zero());
-    for_each_block(stored, [&](Index node, double weight, const Vec3& gradient) {
-      for (Eigen::Index column = 0; column < q.cols(); ++column) {
-        Vec3 part = Vec3::Zero();
-        part.head(d) = q.col(column).segment(d * node, d);
-        sum.col(column) += weight * part;
-        slope[static_cast<std::size_t>(column)] += part * gradient.transpose();
-      }
-    });
+    const CoarseValue at = value(stored, q);
     const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
-    for (Eigen::Index column = 0; column < q.cols(); ++column) {
-      const Mat3 A = turn.R.transpose() * slope[static_cast<std::size_t>(column)];
-      const Vec3 curl(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
-      sum.col(column) = free_part(stored, sum.col(column)) - turn.T * curl;
-    }
-    return sum;
+    const Mat3 A = turn.R.transpose() * at.gradient;
+    const Vec3 curl(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
+    return free_part(stored, at.u) - turn.T * curl;
   }
 
   TwoLevelState state_;

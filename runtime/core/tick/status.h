@@ -24,6 +24,7 @@ enum class StepStatus : std::uint32_t {
   older_patch = 1U << 11,       ///< the overlay for this place was not ready: an older one was used, or none
   late_motion = 1U << 12,    ///< the free motion of the body was not ready in time: the surface waits for it
   rigid_contact = 1U << 13,  ///< the tool presses on a rigid part: only its coupling deforms
+  unbalanced = 1U << 14,  ///< the body's balance at depth was not met: see the estimated error of the force
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
@@ -37,7 +38,7 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 14> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
     {StepStatus::unsettled, "unsettled"},
@@ -51,6 +52,7 @@ inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names
     {StepStatus::older_patch, "older_patch"},
     {StepStatus::late_motion, "late_motion"},
     {StepStatus::rigid_contact, "rigid_contact"},
+    {StepStatus::unbalanced, "unbalanced"},
 }};
 
 }  // namespace palpate

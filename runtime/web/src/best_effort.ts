@@ -4,6 +4,7 @@ import type { Frame, Ticks } from './wire';
 
 const not_converged_bit = 1 << 8; // StepStatus::not_converged
 const late_bit = 1 << 12; // StepStatus::late_motion
+const unbalanced_bit = 1 << 14; // StepStatus::unbalanced
 const stays = 1000; // [ms] that a best effort is told of when it is over
 
 /** What a tick, or the worst of several, could not do. */
@@ -11,6 +12,7 @@ export interface Effort {
   share: number; // of the force that may be wrong; 1: all of it, or more
   left_out: number; // contact points that found no room
   not_converged: boolean;
+  unbalanced: boolean; // at depth
   stood_still: boolean; // the body, which gives way with time
 }
 
@@ -19,11 +21,12 @@ function effort_of(force: number, force_error: number, left_out: number, status:
     share: force_error > 0 ? force_error / Math.max(force, force_error) : 0,
     left_out,
     not_converged: (status & not_converged_bit) !== 0,
+    unbalanced: (status & unbalanced_bit) !== 0,
     stood_still: force_error > 0 && (status & late_bit) !== 0,
   };
 }
 
-const is_best = (effort: Effort): boolean => effort.left_out > 0 || effort.not_converged || effort.stood_still;
+const is_best = (effort: Effort): boolean => effort.left_out > 0 || effort.not_converged || effort.unbalanced || effort.stood_still;
 
 function worst(efforts: Effort[]): Effort | null {
   const told = efforts.filter(is_best);
@@ -32,6 +35,7 @@ function worst(efforts: Effort[]): Effort | null {
     share: Math.max(...told.map((one) => one.share)),
     left_out: Math.max(...told.map((one) => one.left_out)),
     not_converged: told.some((one) => one.not_converged),
+    unbalanced: told.some((one) => one.unbalanced),
     stood_still: told.some((one) => one.stood_still),
   };
 }
@@ -57,6 +61,7 @@ export function sentence(efforts: Effort[]): string {
   if (!effort) return '';
   const reasons: string[] = [];
   if (effort.not_converged) reasons.push('not converged');
+  if (effort.unbalanced) reasons.push('the balance at depth was not met');
   if (effort.stood_still) reasons.push('the body stood still');
   if (effort.left_out > 0) reasons.push(`${effort.left_out} contact point${effort.left_out > 1 ? 's' : ''} left out`);
   const percent = 100 * effort.share;

@@ -4,6 +4,7 @@ import { is_marked, of_tick, RecentEfforts, sentence } from '../src/best_effort'
 import type { Ticks } from '../src/wire';
 
 const not_converged = 1 << 8; // StepStatus::not_converged
+const unbalanced = 1 << 14; // StepStatus::unbalanced
 const pose_limited = 1 << 7;
 const late_motion = 1 << 12;
 
@@ -45,6 +46,10 @@ test('a body that stood still is told where that makes an error', () => {
   assert.equal(said([late_motion, 0, 0]), '');
   assert.equal(said([late_motion, 1.5, 0]), 'Best effort: force within about 75 % (the body stood still)');
   assert.deepEqual([0, 1].map((i) => is_marked(ticks([late_motion, 0, 0], [late_motion, 1, 0]), i)), [false, true]);
+});
+
+test('a balance that was not met at depth is told', () => {
+  assert.equal(said([unbalanced, 0.1, 0]), 'Best effort: force within about 5 % (the balance at depth was not met)');
 });
 
 test('errors that are next to nothing, or all there is', () => {

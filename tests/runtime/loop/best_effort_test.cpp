@@ -79,6 +79,11 @@ TEST(BestEffort, InWordsHasTheReasons) {
   EXPECT_NE(both.find("cut short in 1 of them, up to 4 contact points found no room in 1"), std::string::npos)
       << both;
   EXPECT_NE(both.find("--max-contacts"), std::string::npos) << both;
+  found.add(StepStatus::unbalanced, 1.0, 0.1, 0, 0.8);
+  const std::string deep = in_words(found, 1000);
+  EXPECT_NE(deep.find("cut short in 1 of them, the balance at depth was not met in 1 of them, up to"),
+            std::string::npos)
+      << deep;
 }
 
 }  // namespace
