@@ -140,26 +140,26 @@ Mat3 cofactors(const Mat3& F) noexcept {
 
 PointStress neo_hookean_stress(const LawConstants& c, const Mat3& F) noexcept {
   const Mat3 cof = cofactors(F);
-  const double J = F.col(0).dot(cof.col(0)), I1 = F.squaredNorm();
+  const double J = F.col(0).dot(cof.col(0)), trace_C = F.squaredNorm();
   const VolumeFunction g = shape_factor(J);
-  return {.energy = 0.5 * c.mu * (g.value * I1 - 3.0) + 0.5 * c.bulk * (J - 1.0) * (J - 1.0),
-          .P = c.mu * g.value * F + (0.5 * c.mu * g.first * I1 + c.bulk * (J - 1.0)) * cof};
+  return {.energy = 0.5 * c.mu * (g.value * trace_C - 3.0) + 0.5 * c.bulk * (J - 1.0) * (J - 1.0),
+          .P = c.mu * g.value * F + (0.5 * c.mu * g.first * trace_C + c.bulk * (J - 1.0)) * cof};
 }
 
 PointTangent neo_hookean_tangent(const LawConstants& c, const Mat3& F) noexcept {
   const Mat3 cof = cofactors(F);
-  const double J = F.col(0).dot(cof.col(0)), I1 = F.squaredNorm();
+  const double J = F.col(0).dot(cof.col(0)), trace_C = F.squaredNorm();
   const VolumeFunction g = shape_factor(J);
   const Vector9 f = as_vector(F), n = as_vector(cof);
   PointTangent C = c.mu * g.first * (f * n.transpose() + n * f.transpose()) +
-                   (0.5 * c.mu * g.second * I1 + c.bulk) * n * n.transpose();
+                   (0.5 * c.mu * g.second * trace_C + c.bulk) * n * n.transpose();
   C.diagonal().array() += c.mu * g.value;
-  const double pressure = 0.5 * c.mu * g.first * I1 + c.bulk * (J - 1.0);
-  for (int k = 0; k < 9; ++k) {
-    const int column = k / 3;
+  const double pressure = 0.5 * c.mu * g.first * trace_C + c.bulk * (J - 1.0);
+  for (Eigen::Index k = 0; k < 9; ++k) {
+    const Eigen::Index column = k / 3;
     const Vec3 changed = Vec3::Unit(k % 3);
-    const int next = (column + 1) % 3,
-              last = (column + 2) % 3;  // cof: last = column x next, next = last x column
+    const Eigen::Index next = (column + 1) % 3,
+                       last = (column + 2) % 3;  // cof: last = column x next, next = last x column
     C.block<3, 1>(3 * last, k) += pressure * changed.cross(F.col(next));
     C.block<3, 1>(3 * next, k) += pressure * F.col(last).cross(changed);
   }

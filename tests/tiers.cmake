@@ -47,7 +47,7 @@ set(palpate_dear
   programs_outputs_test.Existing                 test_precompute,test_links_keep_their_place
   programs_cattaneo_test.Cattaneo                test_it_slips_in_a_ring
   geometry_test.ImageMesh                        BallHasItsVolumeAndPlace,CavitiesStayEmpty,EdgesOfBoxesAreKept,BadImages,UnreadableFiles
-  programs_depth_test.Depth                      test_runs_are_equal_and_replay,test_a_rod_that_gives_way_does_not_lose_the_tool
+  programs_depth_test.Depth                      test_runs_are_equal_and_replay,test_a_rod_that_gives_way_does_not_lose_the_tool,test_a_closed_loop_makes_no_energy
   programs_long_test.Outputs                     -
   programs_session_test.Session                  test_says_what_is_in_it
   programs_cube_test.CubeFigures                 test_m6

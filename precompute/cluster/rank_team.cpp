@@ -110,6 +110,7 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   if (!all.empty()) std::memcpy(all.data(), shared.data(), shared.size());
   Round round{all, work, jobs};
   std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(jobs));
   for (int worker = 0; worker < jobs; ++worker)
     threads.emplace_back([this, &round, worker] { solve(round, worker); });
   try {

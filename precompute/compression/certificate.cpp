@@ -159,6 +159,43 @@ TouchablePoints touchable_points(const Model& model, std::span<const Index> stor
   return result;
 }
 
+namespace {
+
+/// A random touch of these nodes.
+Touch chosen_touch(const HierarchicalMatrix& matrix, std::span<const std::int64_t> stored_dofs,
+                   std::span<const Vec3> points, const std::vector<Index>& nodes, std::mt19937_64& random) {
+  const int d = matrix.dimension;
+  std::vector<std::int64_t> dofs;
+  std::vector<Vec3> arms;
+  for (const Index node : nodes) {
+    for (int axis = 0; axis < d; ++axis)
+      dofs.push_back(stored_dofs[static_cast<std::size_t>(std::int64_t{d} * node + axis)]);
+    arms.push_back(points[static_cast<std::size_t>(node)] - points[static_cast<std::size_t>(nodes.front())]);
+  }
+  Rows C(std::ssize(dofs), std::ssize(dofs));
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    gather_blocks(matrix, nodes[i], nodes,
+                  {C.data() + std::int64_t{d} * static_cast<std::int64_t>(i) * C.cols(),
+                   static_cast<std::size_t>(d * C.cols())});
+  }
+  const Eigen::MatrixXd u = touch_displacements(arms, d, random);
+  return {nodes, dofs, u, ForceSearch(C, u)};
+}
+
+struct Measured {
+  double error = -1.0, bound_share = 0.0;  // -1: not yet
+};
+
+Measured measured_errors(const HierarchicalMatrix& matrix, const Touch& touch) {
+  const auto& [nodes, dofs, u, search] = touch;
+  if (!search.has_begun() || !search.is_over()) return {std::numeric_limits<double>::infinity(), 0.0};
+  const Eigen::MatrixXd f = search.stored_forces(u);
+  return {force_error(f.cast<long double>(), search.forces().cast<long double>(), matrix.dimension),
+          bound_share(matrix, nodes, f, search.forces())};
+}
+
+}  // namespace
+
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,
@@ -168,31 +205,12 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
   std::vector<TouchErrors> result;
   result.reserve(std::size(certified_nodes));
   for (const Index nodes : certified_nodes) result.push_back({nodes, {}});
-  struct Measured {
-    double error = -1.0, bound_share = 0.0;  // -1: not yet
-  };
   const std::size_t counts = result.size();
   std::vector<Measured> measured(touchable.empty() ? 0 : static_cast<std::size_t>(touches) * counts);
-  const int d = matrix.dimension;
   const auto chosen = [&](std::int64_t k, std::size_t count) {
     std::mt19937_64 random(seed + static_cast<std::uint64_t>(k) * counts + count);
-    const std::vector<Index> nodes = touched_nodes(k, points, touchable, result[count].nodes, random);
-    std::vector<std::int64_t> dofs;
-    std::vector<Vec3> arms;
-    for (const Index node : nodes) {
-      for (int axis = 0; axis < d; ++axis)
-        dofs.push_back(stored_dofs[static_cast<std::size_t>(std::int64_t{d} * node + axis)]);
-      arms.push_back(points[static_cast<std::size_t>(node)] -
-                     points[static_cast<std::size_t>(nodes.front())]);
-    }
-    Rows C(std::ssize(dofs), std::ssize(dofs));
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      gather_blocks(matrix, nodes[i], nodes,
-                    {C.data() + std::int64_t{d} * static_cast<std::int64_t>(i) * C.cols(),
-                     static_cast<std::size_t>(d * C.cols())});
-    }
-    const Eigen::MatrixXd u = touch_displacements(arms, d, random);
-    return Touch{nodes, dofs, u, ForceSearch(C, u)};
+    return chosen_touch(matrix, stored_dofs, points,
+                        touched_nodes(k, points, touchable, result[count].nodes, random), random);
   };
   SharedItems items;  // one touch of each number of nodes
   items.count = std::ssize(measured) / std::ssize(result);
@@ -201,15 +219,8 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
     for (std::size_t count = 0; count < counts; ++count) together.push_back(chosen(k, count));
     for (int step = 0; step < most_steps; ++step)
       if (!go_on(together, solver, workspaces[static_cast<std::size_t>(worker)])) break;
-    for (std::size_t count = 0; count < counts; ++count) {
-      const auto& [nodes, dofs, u, search] = together[count];
-      Measured& of_touch = measured[static_cast<std::size_t>(k) * counts + count];
-      of_touch.error = std::numeric_limits<double>::infinity();
-      if (!search.has_begun() || !search.is_over()) continue;
-      const Eigen::MatrixXd f = search.stored_forces(u);
-      of_touch = {force_error(f.cast<long double>(), search.forces().cast<long double>(), d),
-                  bound_share(matrix, nodes, f, search.forces())};
-    }
+    for (std::size_t count = 0; count < counts; ++count)
+      measured[static_cast<std::size_t>(k) * counts + count] = measured_errors(matrix, together[count]);
   };
   items.carry = [&](std::int64_t k, Parcel& results) {
     for (std::size_t count = 0; count < counts; ++count) {

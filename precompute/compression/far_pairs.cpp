@@ -9,10 +9,12 @@
 
 #include "precompute/compression/float_entries.h"
 #include "precompute/compression/out_of_reach.h"
+#include "precompute/compression/recompression.h"
 
 namespace palpate {
 namespace {
 
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Dofs = std::vector<std::int64_t>;
 

@@ -273,7 +273,7 @@ std::string draft_text(const std::filesystem::path& description, const std::file
 
 std::filesystem::path draft(const std::filesystem::path& file, const DraftOptions& options, bool has_options,
                             const Tell& tell) {
-  const std::filesystem::path description = draft_file(file, options.elsewhere);
+  std::filesystem::path description = draft_file(file, options.elsewhere);
   const bool is_there = std::filesystem::exists(description);
   if (is_there && !options.renew) {
     use_existing(file, description, has_options, tell);

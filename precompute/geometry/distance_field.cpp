@@ -171,11 +171,24 @@ double DistanceField::operator()(const Vec3& x) const noexcept {
   return is_known ? to_faces(x, voxel, smooth) : smooth;
 }
 
+/// Eighth of a voxel, in which the field is assumed linear.
+struct DistanceField::Eighth {
+  double middle, width;  // of its values
+};
+
+void DistanceField::add_eighths(std::size_t voxel, double least_width, std::vector<Eighth>& to) const {
+  std::array<double, 8> values{};
+  std::array<double, 3> slopes{};
+  for (unsigned k = 0; k < 8; ++k) {
+    const Vec3 side((k & 1U) != 0 ? 0.25 : -0.25, (k & 2U) != 0 ? 0.25 : -0.25, (k & 4U) != 0 ? 0.25 : -0.25);
+    values[k] = (*this)(grid_.center(voxel) + side.cwiseProduct(grid_.spacing));
+    for (unsigned axis = 0; axis < 3; ++axis) slopes[axis] += (k >> axis & 1U) != 0 ? values[k] : -values[k];
+  }
+  const double width = (std::abs(slopes[0]) + std::abs(slopes[1]) + std::abs(slopes[2])) / 4.0 + least_width;
+  for (const double value : values) to.push_back({value, width});
+}
+
 void DistanceField::grow_to(double voxels) {
-  // Eighths of voxels, in each of which the field is assumed linear.
-  struct Eighth {
-    double middle, width;  // of its values
-  };
   const double most = 2.0 * grid_.spacing.maxCoeff();  // largest shift of the boundary
   const double reach = 2.0 * grid_.spacing.norm();     // largest change of a field within a voxel
   double inside = 0.0;
@@ -187,18 +200,7 @@ void DistanceField::grow_to(double voxels) {
     } else if (middle > reach) {
       inside += 8.0;
     } else if (middle > -most - reach) {
-      std::array<double, 8> values{};
-      std::array<double, 3> slopes{};
-      for (unsigned k = 0; k < 8; ++k) {
-        const Vec3 side((k & 1U) != 0 ? 0.25 : -0.25, (k & 2U) != 0 ? 0.25 : -0.25,
-                        (k & 4U) != 0 ? 0.25 : -0.25);
-        values[k] = (*this)(grid_.center(v) + side.cwiseProduct(grid_.spacing));
-        for (unsigned axis = 0; axis < 3; ++axis)
-          slopes[axis] += (k >> axis & 1U) != 0 ? values[k] : -values[k];
-      }
-      const double width =
-          (std::abs(slopes[0]) + std::abs(slopes[1]) + std::abs(slopes[2])) / 4.0 + 1e-9 * most;
-      for (const double value : values) near.push_back({value, width});
+      add_eighths(v, 1e-9 * most, near);
     }
   }
   const auto volume = [&](double level) {

@@ -30,6 +30,8 @@ class DistanceField {
   void grow_to(double voxels);
 
  private:
+  struct Eighth;
+  void add_eighths(std::size_t voxel, double least_width, std::vector<Eighth>& to) const;
   [[nodiscard]] double to_faces(const Vec3& x, const std::array<Index, 3>& voxel,
                                 double smooth) const noexcept;
 

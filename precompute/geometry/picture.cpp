@@ -87,6 +87,7 @@ std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
 PolygonGeometry simplified(const std::vector<std::vector<Point>>& lines, double tolerance) {
   Triangulation triangulation;
   std::vector<Triangulation::Constraint_id> ids;
+  ids.reserve(lines.size());
   for (const std::vector<Point>& points : lines)
     ids.push_back(triangulation.insert_constraint(points.begin(), points.end(), true));
   simplification::simplify(triangulation, simplification::Squared_distance_cost(),

@@ -225,7 +225,7 @@ std::vector<Line> divided(const std::vector<Line>& lines, double edge_length, co
       if (total > max_nodes) {
         throw_too_many(0.0, where);
       }
-      for (double part = 0.0; part < parts; part += 1.0) {
+      for (int part = 0; part < static_cast<int>(parts); ++part) {
         result.back().push_back(line[i] + part / parts * edge);
       }
     }

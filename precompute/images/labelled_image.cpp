@@ -104,42 +104,15 @@ std::string and_list(const std::vector<std::int32_t>& labels) {
   return text;
 }
 
-/// Marks the voxels with one of the labels (all but 0 if none are listed).
-VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std::string>& notes) {
-  const std::string where = image.file.string();
-  const std::vector<int>& wanted = image.labels;
-  std::span<const std::byte> rest = bytes;
-  const std::vector<ImageHeader> headers = take_array<ImageHeader>(rest);
-  std::vector<std::int32_t> labels = take_array<std::int32_t>(rest);
-  if (headers.size() != 1) {
-    fail_on_answer();
-  }
-  const ImageHeader& header = headers[0];
-  VoxelBody body;
-  body.size = header.size;
-  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
-  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
-  if (labels.size() != body.voxels()) {
-    fail_on_answer();
-  }
-  check_geometry(body, header.sheared, where);
-  if (header.turned > least_turn)
-    notes.push_back(fmt::format(
-        "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
-  if (header.sheared > 0.0) {
-    notes.push_back(
-        fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry, and so is the body",
-                    header.sheared));
-  }
-  body.file_unit = header.unit;
-  body.shear = Mat3::Map(header.shear.data());
-  body.sheared_about = body.origin;
-
-  std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
-  body.inside.reserve(labels.size());
+/// Marks the voxels with one of the wanted labels (all but 0 if none are listed); labels that occur, and
+/// whether they are wanted.
+std::map<std::int32_t, std::uint8_t> mark(const std::vector<std::int32_t>& labels,
+                                          const std::vector<int>& wanted, std::vector<std::uint8_t>& inside) {
+  std::map<std::int32_t, std::uint8_t> selected;
+  inside.reserve(labels.size());
   for (std::size_t v = 0; v < labels.size(); ++v) {
     if (v > 0 && labels[v] == labels[v - 1]) {  // most are
-      body.inside.push_back(body.inside.back());
+      inside.push_back(inside.back());
       continue;
     }
     const std::int32_t label = labels[v];
@@ -148,14 +121,16 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
       entry->second =
           wanted.empty() ? label != 0 : std::find(wanted.begin(), wanted.end(), label) != wanted.end();
     }
-    body.inside.push_back(entry->second);
+    inside.push_back(entry->second);
   }
-  if (image.regions) {
-    body.labels = std::move(labels);
-    for (std::size_t v = 0; v < body.labels.size(); ++v) {
-      body.labels[v] = body.inside[v] != 0 ? body.labels[v] : VoxelBody::no_label;
-    }
-  }
+  return selected;
+}
+
+/// Throws Error where labels do not make the body that is asked for; notes where they are merged.
+void check_selected(const std::map<std::int32_t, std::uint8_t>& selected, const ImageHeader& header,
+                    const ImageGeometry& image, std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  const std::vector<int>& wanted = image.labels;
   std::string occurring;
   std::vector<std::int32_t> merged;
   for (const auto& [label, is_body] : selected) {
@@ -183,6 +158,46 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
                     "[geometry]",
                     and_list(merged), merged.front(), merged.front()));
   }
+}
+
+/// The body of an answer: the voxels with one of the labels.
+VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  std::span<const std::byte> rest = bytes;
+  const std::vector<ImageHeader> headers = take_array<ImageHeader>(rest);
+  std::vector<std::int32_t> labels = take_array<std::int32_t>(rest);
+  if (headers.size() != 1) {
+    fail_on_answer();
+  }
+  const ImageHeader& header = headers[0];
+  VoxelBody body;
+  body.size = header.size;
+  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
+  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
+  if (labels.size() != body.voxels()) {
+    fail_on_answer();
+  }
+  check_geometry(body, header.sheared, where);
+  if (header.turned > least_turn)
+    notes.push_back(fmt::format(
+        "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
+  if (header.sheared > 0.0) {
+    notes.push_back(
+        fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry, and so is the body",
+                    header.sheared));
+  }
+  body.file_unit = header.unit;
+  body.shear = Mat3::Map(header.shear.data());
+  body.sheared_about = body.origin;
+
+  const std::map<std::int32_t, std::uint8_t> selected = mark(labels, image.labels, body.inside);
+  if (image.regions) {
+    body.labels = std::move(labels);
+    for (std::size_t v = 0; v < body.labels.size(); ++v) {
+      body.labels[v] = body.inside[v] != 0 ? body.labels[v] : VoxelBody::no_label;
+    }
+  }
+  check_selected(selected, header, image, notes);
   return body;
 }
 

@@ -47,39 +47,42 @@ struct Dimensions {
   std::array<double, 18> place{};  // quatern_b, c, d and qoffset, then the matrix by rows
 };
 
+Dimensions dimensions_1(std::span<const char> header, bool swapped) {
+  Dimensions result;
+  for (std::size_t i = 0; i < 8; ++i) result.dim.at(i) = number_at<std::int16_t>(header, 40 + 2 * i, swapped);
+  result.bits = number_at<std::int16_t>(header, 72, swapped);
+  result.offset = static_cast<double>(number_at<float>(header, 108, swapped));
+  result.shift = static_cast<double>(number_at<float>(header, 116, swapped));
+  for (std::size_t i = 0; i < 3; ++i)
+    result.sides.at(i) = static_cast<double>(number_at<float>(header, 80 + 4 * i, swapped));
+  result.has_quaternion = number_at<std::int16_t>(header, 252, swapped) > 0;
+  result.has_matrix = number_at<std::int16_t>(header, 254, swapped) > 0;
+  for (std::size_t i = 0; i < 18; ++i)
+    result.place.at(i) = static_cast<double>(number_at<float>(header, 256 + 4 * i, swapped));
+  return result;
+}
+
+Dimensions dimensions_2(std::span<const char> header, bool swapped) {
+  Dimensions result;
+  for (std::size_t i = 0; i < 8; ++i) result.dim.at(i) = number_at<std::int64_t>(header, 16 + 8 * i, swapped);
+  result.bits = number_at<std::int16_t>(header, 14, swapped);
+  result.offset = static_cast<double>(number_at<std::int64_t>(header, 168, swapped));
+  result.shift = number_at<double>(header, 184, swapped);
+  for (std::size_t i = 0; i < 3; ++i) result.sides.at(i) = number_at<double>(header, 112 + 8 * i, swapped);
+  result.has_quaternion = number_at<std::int32_t>(header, 344, swapped) > 0;
+  result.has_matrix = number_at<std::int32_t>(header, 348, swapped) > 0;
+  for (std::size_t i = 0; i < 18; ++i) result.place.at(i) = number_at<double>(header, 352 + 8 * i, swapped);
+  return result;
+}
+
 std::optional<Dimensions> read_dimensions(std::span<const char> header) {
   if (header.size() < size_1) return {};
   for (const bool swapped : {false, true}) {
     const auto size = number_at<std::int32_t>(header, 0, swapped);
-    Dimensions result;
-    if (size == size_1 && std::string_view(header.data() + 344, 3) == "n+1") {
-      for (std::size_t i = 0; i < 8; ++i)
-        result.dim.at(i) = number_at<std::int16_t>(header, 40 + 2 * i, swapped);
-      result.bits = number_at<std::int16_t>(header, 72, swapped);
-      result.offset = static_cast<double>(number_at<float>(header, 108, swapped));
-      result.shift = static_cast<double>(number_at<float>(header, 116, swapped));
-      for (std::size_t i = 0; i < 3; ++i)
-        result.sides.at(i) = static_cast<double>(number_at<float>(header, 80 + 4 * i, swapped));
-      result.has_quaternion = number_at<std::int16_t>(header, 252, swapped) > 0;
-      result.has_matrix = number_at<std::int16_t>(header, 254, swapped) > 0;
-      for (std::size_t i = 0; i < 18; ++i)
-        result.place.at(i) = static_cast<double>(number_at<float>(header, 256 + 4 * i, swapped));
-      return result;
-    }
-    if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2") {
-      for (std::size_t i = 0; i < 8; ++i)
-        result.dim.at(i) = number_at<std::int64_t>(header, 16 + 8 * i, swapped);
-      result.bits = number_at<std::int16_t>(header, 14, swapped);
-      result.offset = static_cast<double>(number_at<std::int64_t>(header, 168, swapped));
-      result.shift = number_at<double>(header, 184, swapped);
-      for (std::size_t i = 0; i < 3; ++i)
-        result.sides.at(i) = number_at<double>(header, 112 + 8 * i, swapped);
-      result.has_quaternion = number_at<std::int32_t>(header, 344, swapped) > 0;
-      result.has_matrix = number_at<std::int32_t>(header, 348, swapped) > 0;
-      for (std::size_t i = 0; i < 18; ++i)
-        result.place.at(i) = number_at<double>(header, 352 + 8 * i, swapped);
-      return result;
-    }
+    if (size == size_1 && std::string_view(header.data() + 344, 3) == "n+1")
+      return dimensions_1(header, swapped);
+    if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2")
+      return dimensions_2(header, swapped);
   }
   return {};
 }

@@ -73,23 +73,25 @@ EqualNumbers number_voxels(const VoxelGrid& grid, const std::vector<Value>& valu
                            std::vector<Index>& number_of) {
   EqualNumbers equal;
   const std::array<std::size_t, 3> stride = {1, grid.at(0, 1, 0), grid.at(0, 0, 1)};
+  const auto number = [&](std::size_t v, const std::array<bool, 3>& has_before) {
+    Index found = -1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!has_before[axis] || values[v - stride[axis]] != values[v]) {
+        continue;
+      }
+      const Index before = number_of[v - stride[axis]];
+      if (found >= 0 && before != found) {
+        equal.join(before, found);
+      }
+      found = before;
+    }
+    return found >= 0 ? found : equal.add();
+  };
   std::size_t v = 0;
   for (Index k = 0; k < grid.size[2]; ++k) {
     for (Index j = 0; j < grid.size[1]; ++j) {
       for (Index i = 0; i < grid.size[0]; ++i, ++v) {
-        Index number = -1;
-        const std::array<bool, 3> has_before = {i > 0, j > 0, k > 0};
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          if (!has_before[axis] || values[v - stride[axis]] != values[v]) {
-            continue;
-          }
-          const Index before = number_of[v - stride[axis]];
-          if (number >= 0 && before != number) {
-            equal.join(before, number);
-          }
-          number = before;
-        }
-        number_of[v] = number >= 0 ? number : equal.add();
+        number_of[v] = number(v, {i > 0, j > 0, k > 0});
       }
     }
   }

@@ -90,6 +90,7 @@ void take_blas_room(int threads) {
   const auto give_back = reinterpret_cast<void (*)(void*)>(::dlsym(RTLD_DEFAULT, "blas_memory_free"));
   if (take == nullptr || give_back == nullptr) return;
   std::vector<void*> buffers;
+  buffers.reserve(static_cast<std::size_t>(threads));
   for (int k = 0; k < threads; ++k) buffers.push_back(take(0));
   for (void* const buffer : buffers) give_back(buffer);
 }

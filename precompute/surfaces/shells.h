@@ -39,6 +39,6 @@ struct BodyShells {
 /// closed shells correctly.
 BodyShells body_shells(
     std::vector<TriangleSurface> shells, const std::function<TriangleSurface(TriangleSurface)>& mend =
-                                             [](TriangleSurface shell) { return shell; });
+                                             [](const TriangleSurface& shell) { return shell; });
 
 }  // namespace palpate

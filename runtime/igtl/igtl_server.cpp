@@ -5,7 +5,6 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
 #include <cstdint>
-#include <ranges>
 #include <utility>
 
 #include "runtime/igtl/igtl_messages.h"
@@ -140,14 +139,15 @@ void IgtlServer::tick() {
 /// Cuts the newest client before the last of the address that has most, so that no address keeps the others
 /// out, and clients that have watched long stay.
 void IgtlServer::make_room() {
-  const auto newest_first = std::views::reverse(clients_);
-  const auto most =
-      std::ranges::max_element(newest_first, {}, [this](const auto& client) {  // a tie: the last
-        return std::ranges::count(clients_, client->address(), &IgtlClient::address);
-      });
-  const auto out = std::ranges::find(newest_first.begin() + 1, newest_first.end(), (*most)->address(),
-                                     &IgtlClient::address);
-  const auto gone = out == newest_first.end() ? std::prev(clients_.end()) : std::prev(out.base());
+  const auto clients_of = [this](const asio::ip::address& address) {
+    return std::ranges::count(clients_, address, &IgtlClient::address);
+  };
+  const auto most = std::max_element(  // newest first; a tie: the newest
+      clients_.rbegin(), clients_.rend(),
+      [&](const auto& a, const auto& b) { return clients_of(a->address()) < clients_of(b->address()); });
+  const auto out = std::find_if(clients_.rbegin() + 1, clients_.rend(),
+                                [&](const auto& client) { return client->address() == (*most)->address(); });
+  const auto gone = out == clients_.rend() ? std::prev(clients_.end()) : std::prev(out.base());
   (*gone)->cut();
   clients_.erase(gone);
 }

@@ -256,8 +256,9 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
                  code = PALPATE_ERROR_FILE;
                  Model model = load_model(file);
                  code = PALPATE_ERROR_ARGUMENT;
-                 session = new palpate_session(std::make_unique<OwnLoop>(file, std::move(model), state,
-                                                                         overlay, contact, stress_ticks));
+                 auto loop =
+                     std::make_unique<OwnLoop>(file, std::move(model), state, overlay, contact, stress_ticks);
+                 session = std::make_unique<palpate_session>(std::move(loop)).release();
                });
   return session;
 }

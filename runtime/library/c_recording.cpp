@@ -71,7 +71,7 @@ palpate_recording* palpate_recording_open(const char* file, char* error, size_t 
     if (file == nullptr)
       throw Error("there is no file name", "palpate_recording_open", "name a recording, OUT.mcap");
     code = PALPATE_ERROR_FILE;
-    recording = new palpate_recording(std::make_unique<ReadRecording>(file));
+    recording = std::make_unique<palpate_recording>(std::make_unique<ReadRecording>(file)).release();
   });
   return recording;
 }

@@ -19,8 +19,8 @@ enum class Use : std::uint32_t { alone = 1U << 30U, shared = 1 };
 template <typename T>
 class Guarded {
  public:
-  explicit Guarded(std::unique_ptr<T> value) : value_(value.release()), next_(all_.load()) {
-    while (!all_.compare_exchange_weak(next_, this)) {
+  explicit Guarded(std::unique_ptr<T> value) : value_(value.release()), next_(all.load()) {
+    while (!all.compare_exchange_weak(next_, this)) {
     }
   }
   Guarded(const Guarded&) = delete;
@@ -66,7 +66,7 @@ class Guarded {
   std::atomic<T*> value_;
   Guarded* next_;
   const pid_t process_ = ::getpid();
-  inline static std::atomic<Guarded*> all_ = nullptr;  // keeps all guards reachable for leak checkers
+  inline static std::atomic<Guarded*> all = nullptr;  // keeps all guards reachable for leak checkers
 };
 
 /// Access of a thread to a Guarded, for the lifetime of this. Holds null if access is refused.

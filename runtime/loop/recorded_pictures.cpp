@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "base/error.h"
 #include "formats/model_file.h"
@@ -39,7 +40,8 @@ std::filesystem::path find_model(const RecordingFile& recording) {
 RecordedPictures::RecordedPictures(const RecordingFile& recording) : recording_(recording) {
   if (recording.stores_pictures()) return;
   const Settings settings = read_settings(split_settings(recording.info().options));
-  body_.reset(new Body(load_body(find_model(recording), {}, settings.body())));
+  std::unique_ptr<const Body> body(new Body(load_body(find_model(recording), {}, settings.body())));
+  body_ = std::move(body);
   if (!pictures_follow_from_contacts(*body_) ||
       recorded_surface(*body_).pressed_nodes() != recording.surface().pressed_nodes())
     throw Error("has contact forces of another body than its model is", recording.path().string(),

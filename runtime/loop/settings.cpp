@@ -274,6 +274,7 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
 
 /// Visits the settings of the live solver.
 template <class SomeSettings, class Visitor>
+// NOLINTNEXTLINE(readability-function-size): a table
 void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   auto& [solver, poissons_ratio, step, integrator, step_solver, gravity, mass_damping, stiffness_damping,
          yield, creep, most_plastic, free, floor, room, obstacle, wall_friction] = live;

@@ -34,7 +34,7 @@ std::string token_of(const ViewerOptions& options) {
   try {
     const std::filesystem::path file = private_file(fmt::format("viewer-{}.token", options.port));
     const std::string kept = read_private_file(file);
-    const std::string before = kept.substr(0, token.size());
+    std::string before = kept.substr(0, token.size());
     if (is_token(before) && kept == before + "\n" + shows) return before;
     write_private_file(file, token + "\n" + shows);
   } catch (const Error&) {  // no folder for it: the next run gets a new token

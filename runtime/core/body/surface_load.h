@@ -45,7 +45,7 @@ struct SurfaceLoad {
                               const Vec3& f) const noexcept;
   /// True if forces on the surface nodes of a patch fit.
   [[nodiscard]] bool fits(const Patch& other) const noexcept {
-    return !other.is_sampled() || other.fine_dofs() <= dimension * Patch::most_nodes;
+    return !other.is_sampled() || other.fine_dofs() <= std::ptrdiff_t{dimension} * Patch::most_nodes;
   }
 
   /// Stored nodes and forces on them, d numbers each [N], that displace the body without the overlay as it is

@@ -176,7 +176,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     tool.greens_error =
         std::hypot(tool.greens_error,
                    greens_error(state.surface.near, scratch.greens_error, {scratch.rows.data(), count},
-                                {scratch.changes.of_forces.data() + axis * rows, count}));
+                                {scratch.changes.of_forces.data() + std::ptrdiff_t{axis} * rows, count}));
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);

@@ -129,7 +129,8 @@ VectorLanes turn_normals(RollingScratch& rolling, const VectorLanes& tool) noexc
     for (std::size_t axis = 0; axis < 3; ++axis)
       force[axis] = turning.spring * (force[axis] - turning.normal[axis] * normal);
     add(force, sum);
-    for (std::size_t axis = 0; axis < D; ++axis) rolling.next_force[D * k + axis] = force[axis];
+    for (std::size_t axis = 0; axis < D; ++axis)
+      rolling.next_force[static_cast<std::size_t>(D) * static_cast<std::size_t>(k) + axis] = force[axis];
   }
   std::swap(rolling.turning_force, rolling.next_force);
   return sum;

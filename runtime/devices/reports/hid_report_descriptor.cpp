@@ -332,6 +332,7 @@ std::optional<HidOption> HidReportDescriptor::option(HidReportType type, const s
 }
 
 std::int64_t read_element(const HidElement& element, std::span<const std::uint8_t> report) noexcept {
+  if (element.bits == 0) return 0;
   std::uint64_t value = 0;
   for (std::uint32_t i = 0; i < element.bits; ++i) {
     const std::uint32_t bit = element.bit + i;

@@ -23,6 +23,7 @@ double or_infinite(std::uint32_t value, double unit) noexcept {
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-function-size): a table
 std::vector<std::uint8_t> board_report_descriptor(int axes) {
   const auto count = static_cast<std::uint8_t>(axes);
   return {

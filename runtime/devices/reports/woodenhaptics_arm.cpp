@@ -51,16 +51,16 @@ Vec3 arm_position(const ArmConstants& arm, const Vec3& angles) noexcept {
 }
 
 Mat3 arm_jacobian(const ArmConstants& arm, const Vec3& angles) noexcept {
-  const double Lb = arm.lengths[1];
-  const double Lc = arm.lengths[2];
-  const double sinA = std::sin(angles[0]), cosA = std::cos(angles[0]);
-  const double sinB = std::sin(angles[1]), cosB = std::cos(angles[1]);
-  const double sinC = std::sin(angles[2]), cosC = std::cos(angles[2]);
-  const double reach = Lb * sinB + Lc * sinC;
+  const double L_b = arm.lengths[1];
+  const double L_c = arm.lengths[2];
+  const double sin_A = std::sin(angles[0]), cos_A = std::cos(angles[0]);
+  const double sin_B = std::sin(angles[1]), cos_B = std::cos(angles[1]);
+  const double sin_C = std::sin(angles[2]), cos_C = std::cos(angles[2]);
+  const double reach = L_b * sin_B + L_c * sin_C;
   Mat3 J;
-  J << -sinA * reach, cosA * Lb * cosB, cosA * Lc * cosC,  //
-      cosA * reach, sinA * Lb * cosB, sinA * Lc * cosC,    //
-      0.0, -Lb * sinB, Lc * sinC;
+  J << -sin_A * reach, cos_A * L_b * cos_B, cos_A * L_c * cos_C,  //
+      cos_A * reach, sin_A * L_b * cos_B, sin_A * L_c * cos_C,    //
+      0.0, -L_b * sin_B, L_c * sin_C;
   return J;
 }
 
@@ -75,14 +75,14 @@ std::optional<Vec3> inverse_arm(const ArmConstants& arm, const Vec3& position) n
   const Vec3 p = position + arm.workspace_origin;
   const double reach = std::hypot(p.x(), p.y());
   const double height = p.z() - arm.lengths[0];
-  const double Lb = arm.lengths[1];
-  const double Lc = arm.lengths[2];
+  const double L_b = arm.lengths[1];
+  const double L_c = arm.lengths[2];
   const double distance = std::hypot(reach, height);
-  if (!(reach > 0.0) || !(distance <= Lb + Lc) || distance < std::abs(Lb - Lc)) return std::nullopt;
+  if (!(reach > 0.0) || !(distance <= L_b + L_c) || distance < std::abs(L_b - L_c)) return std::nullopt;
   // Triangle of b, c and the line from b's joint to the handle, by the law of cosines.
-  const double cosine = (Lb * Lb + distance * distance - Lc * Lc) / (2.0 * Lb * distance);
+  const double cosine = (L_b * L_b + distance * distance - L_c * L_c) / (2.0 * L_b * distance);
   const double B = std::atan2(reach, height) - std::acos(std::clamp(cosine, -1.0, 1.0));
-  const double C = std::atan2(reach - Lb * std::sin(B), Lb * std::cos(B) - height);
+  const double C = std::atan2(reach - L_b * std::sin(B), L_b * std::cos(B) - height);
   return Vec3(std::atan2(p.y(), p.x()), B, C);
 }
 

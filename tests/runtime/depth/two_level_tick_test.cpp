@@ -241,7 +241,7 @@ TEST(TwoLevelTick, LateStepsLoseNoTool) {
     std::printf("late by %d ticks: force %.5g N, %d ticks without contact, largest change %.2g N\n", late,
                 last, lost, jump);
     EXPECT_EQ(lost, 0);
-    EXPECT_EQ(unsettled > 0, late > 0);  // its force changes long after the ball has come to rest
+    EXPECT_EQ(unsettled > 0, late > 50);  // its force changes long after the ball has come to rest
     EXPECT_FALSE(has(at_end, StepStatus::unsettled));
     EXPECT_LT(jump, 0.015 * last);  // 0.013; 0.019 where the nodes are torn apart
     EXPECT_NEAR(last / force.front(), 1.0, 1e-3);
