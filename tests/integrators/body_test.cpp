@@ -1,6 +1,7 @@
 // Time integrators on an elastic body, against its modes.
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <cmath>
 #include <map>
 #include <vector>

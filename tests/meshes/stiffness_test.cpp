@@ -142,13 +142,13 @@ TEST_P(ElementStiffness, StrainEnergyAndForcesOfALinearField) {
   }
   for (const Analysis analysis : analyses(type)) {
     const ElasticityMatrix D = elasticity_matrix(rubber, analysis);
-    const Eigen::VectorXd Ku = element_stiffness(type, shape.x, D, thickness) * u;
+    const Eigen::VectorXd K_u = element_stiffness(type, shape.x, D, thickness) * u;
     const double energy =
         thickness * shape.measure *
         (0.5 * lambda_of(analysis) * std::pow(strain.trace(), 2) + mu() * strain.squaredNorm());
-    EXPECT_NEAR(0.5 * u.dot(Ku), energy, 1e-13 * energy);
+    EXPECT_NEAR(0.5 * u.dot(K_u), energy, 1e-13 * energy);
     const Eigen::VectorXd force = element_stress_force(type, shape.x, D * engineering, thickness);
-    EXPECT_LT((force - Ku).norm(), 1e-13 * Ku.norm());
+    EXPECT_LT((force - K_u).norm(), 1e-13 * K_u.norm());
   }
 }
 

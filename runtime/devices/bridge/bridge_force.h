@@ -32,6 +32,7 @@ static inline void bridge_force(const struct bridge_command* command, const doub
     b = command->damping;
     for (int k = 0; k < 3; ++k) d[k] = x[k] - command->point[k];
     const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), radius = fmax(command->radius, 0.0);
+    /* NOLINTNEXTLINE(modernize-loop-convert): C has no other */
     for (int k = 0; k < 3; ++k) d[k] *= length > radius ? radius / length : 1.0;
   }
   force[0] = share * (command->force[0] - (K[0] * d[0] + K[3] * d[1] + K[5] * d[2]) - b * v[0]);

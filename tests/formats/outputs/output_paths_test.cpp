@@ -64,14 +64,15 @@ TEST(OutputKind, IsKnownByItsContent) {
 
 TEST(OutputKind, WhatOthersWriteIsNotOurs) {
   const Folder folder;
+  const char* const vtu =
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+      "byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"8\"";
   for (const std::string text :
        {"{\n  \"file\": \"a.hdf\"\n}\n", "x,y,z\n0,0,0\n", "node,x,y,z\n", "notes\n", "\n",
         "\x89HDF\r\n\x1a\n", "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held,remark\n",
-        "time,device_x,device_y,device_z,mine\n",
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
-        "byte_order=\"LittleEndian\" "
-        "header_type=\"UInt64\">\n  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"8\"",
-        "<!doctype html>\n<title>Mine</title>", "OFF\n8 6 0\n"}) {
+        "time,device_x,device_y,device_z,mine\n", vtu, "<!doctype html>\n<title>Mine</title>",
+        "OFF\n8 6 0\n"}) {
     write_bytes(folder / "out", text);
     for (const OutputKind kind : all_kinds) EXPECT_FALSE(is_ours(folder / "out", kind)) << text;
   }

@@ -12,7 +12,7 @@
 #include "precompute/spread_plan.h"
 
 /// OpenMPI leaks in modules that it has closed again, whose names are then not known.
-// NOLINTNEXTLINE(bugprone-reserved-identifier): the sanitizer's name
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming): the sanitizer's name
 extern "C" __attribute__((visibility("default"))) const char* __asan_default_options() {
   return "detect_leaks=0";
 }

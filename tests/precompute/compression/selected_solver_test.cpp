@@ -209,8 +209,8 @@ TEST(SelectedSolver, MoreRowsOrColumnsAreNotFewerFlops) {
   EXPECT_EQ(body.solver.flops({}, {}), 0.0);
   EXPECT_EQ(body.solver.flops(Dofs{-1}, Dofs{-1}), 0.0);
   // All of L twice, off the diagonal a product and a sum, on it a division: about four flops an entry.
-  const double all_of_L = body.solver.flops(all, Dofs{0, 1, 2}) / 3.0;
-  EXPECT_LT(all_of_L, 4.1 * static_cast<double>(body.factor.entries()));
+  const double of_L = body.solver.flops(all, Dofs{0, 1, 2}) / 3.0;
+  EXPECT_LT(of_L, 4.1 * static_cast<double>(body.factor.entries()));
 }
 
 }  // namespace

@@ -181,7 +181,7 @@ TEST_F(HostileInput, ImageHeadersThatLie) {
 TEST_F(HostileInput, GzippedImageIsMeasuredUnpacked) {
   const auto write = [&](const std::string& name, const std::string& text) {
     const std::string path = (folder_.path() / name).string();
-    const gzFile file = gzopen(path.c_str(), "wb");
+    gzFile_s* const file = gzopen(path.c_str(), "wb");
     gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
     gzclose(file);
     return path;

@@ -349,7 +349,7 @@ TEST_F(NiftiImage, LabelsThatAreMergedAreTold) {
 
 TEST_F(NiftiImage, GzippedIsTheSame) {
   const std::string path = (folder_.path() / "A.NII.GZ").string(), bytes = nifti({});
-  const gzFile file = gzopen(path.c_str(), "wb");
+  gzFile_s* const file = gzopen(path.c_str(), "wb");
   gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
   gzclose(file);
   EXPECT_EQ(check_nifti_header(open_file(path, OpenMode::read)), std::ssize(bytes));

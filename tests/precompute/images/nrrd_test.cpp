@@ -108,7 +108,7 @@ std::string nrrd(const Layout& layout) {
 }
 
 std::string gzipped(const std::string& bytes, const std::filesystem::path& scratch) {
-  const gzFile file = gzopen(scratch.c_str(), "wb");
+  gzFile_s* const file = gzopen(scratch.c_str(), "wb");
   gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
   gzclose(file);
   std::ifstream stream(scratch, std::ios::binary);

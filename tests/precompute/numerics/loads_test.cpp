@@ -216,14 +216,14 @@ TEST_P(LoadedKind, HangingBar) {
 
 TEST_P(LoadedKind, UniformTensionIsExact) {
   constexpr double pull = 250.0;
-  const double E1 = axial_modulus(GetParam().analysis), side = contraction(GetParam().analysis);
+  const double E_bar = axial_modulus(GetParam().analysis), side = contraction(GetParam().analysis);
   for (int axis = 0; axis < GetParam().dimension(); ++axis) {
     Loaded model = bar(GetParam());
     model.hold_on_rollers();
     model.description.loads = {Traction{pull * Vec3::Unit(axis), face(axis, size[axis])}};
     model.solve();
     EXPECT_LT(model.error([&](const Vec3& x) -> Vec3 {
-      return pull / E1 * ((1.0 + side) * x[axis] * Vec3::Unit(axis) - side * x);
+      return pull / E_bar * ((1.0 + side) * x[axis] * Vec3::Unit(axis) - side * x);
     }),
               1e-11);
     const double force = pull * model.area(axis);

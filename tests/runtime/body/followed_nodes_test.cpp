@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "tests/support/bodies/runtime_model.h"
 #include "tests/support/compression/hierarchical_sample.h"
 
 namespace palpate::followed_nodes_test {

@@ -207,7 +207,7 @@ class OverlayTick : public Tick {
       const double height = k % 200 < 20 ? 1.1 : 1.04;
       poses_[k].position = test::upright(GetParam(), 0.2 + 0.001 * static_cast<double>(k % 50), 0.5, height);
     }
-    PatchMaker maker(overlaid_, 1, finest_);
+    PatchMaker maker(overlaid_, 1, finest);
     for (const double x : {0.0, 0.3, 0.6}) {
       const Index stored = overlaid_.nearest_surface_node(test::upright(GetParam(), x, 0.5, 1.0)).node;
       const Index centre = rounded_ ? overlaid_.surface_node_of_stored(stored) : stored;
@@ -231,7 +231,7 @@ class OverlayTick : public Tick {
 
   void exercise_beside(const PatchSourceOptions& options);
 
-  static constexpr double finest_ = 0.1;  // of rounded ones
+  static constexpr double finest = 0.1;  // of rounded ones
   static constexpr int most_rounds = 2000;
 
   bool rounded_;
@@ -301,7 +301,7 @@ TEST_P(GradedTick, MakesNoHeapCall) {
 }
 
 TEST_P(GradedTick, MakesNoHeapCallBesideTheBuilder) {
-  exercise_beside({.rings = 1, .finest = finest_, .memory = 1 << 22});
+  exercise_beside({.rings = 1, .finest = finest, .memory = 1 << 22});
 }
 
 void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
@@ -311,8 +311,7 @@ void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
   };
   const auto exercise = [&] {
     for (int round = 0; round < 20 || (round < most_rounds && !is_done()); ++round) {
-      for (std::size_t k = 0; k < poses_.size(); ++k) {
-        ToolPose pose = poses_[k];
+      for (ToolPose pose : poses_) {
         pose.position.x() += 0.04 * (round % 20);
         source.serve(with_);
         step(overlaid_, with_, pose);
