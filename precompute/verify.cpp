@@ -43,8 +43,8 @@ Vector multiply(std::span<const T> packed, const Vector& f) {
 }
 
 Vector multiply(const PackedGreens& greens, const Vector& f) {
-  const Vector u = has_float_entries(greens.precision()) ? multiply(greens.as<float>(), f)
-                                                         : multiply(greens.as<double>(), f);
+  Vector u = has_float_entries(greens.precision()) ? multiply(greens.as<float>(), f)
+                                                   : multiply(greens.as<double>(), f);
   if (greens.smooth() == nullptr) return u;
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const SmoothPart& smooth = *greens.smooth();

@@ -39,8 +39,10 @@ void start_blas(char** argv) {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", unknown);
   if (settings.empty() || unknown) return;
   std::vector<std::string> ours;
+  ours.reserve(settings.size());
   for (const auto& [name, value] : settings) ours.push_back(std::string(name) + '=' + value);
   std::vector<char*> environment;
+  environment.reserve(ours.size());
   for (std::string& setting : ours) environment.push_back(setting.data());
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string_view of_caller = *entry;

@@ -344,8 +344,11 @@ class PlyReader {
         skip(*property.type);
     }
     if (!corners) return;
-    if (element_->name == "face") soup.polygons.push_back(std::move(list));
-    if (element_->name == "tristrips") add_strips(list, soup);
+    if (element_->name == "tristrips") {
+      add_strips(list, soup);
+    } else if (element_->name == "face") {
+      soup.polygons.push_back(std::move(list));
+    }
   }
 
   /// Adds strips of triangles, every other one of which is reversed; -1 ends a strip.

@@ -190,7 +190,7 @@ std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const s
     out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
   }
   try {
-    const std::filesystem::path file =
+    std::filesystem::path file =
         OutputPaths({}, keep).add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
     (keep ? write_new_file : write_file)(file, out.str());
     return file;

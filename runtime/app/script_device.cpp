@@ -108,7 +108,7 @@ std::string missing_columns(const Columns& columns) {
 }
 
 /// Parses a number with a decimal point or, unless commas separate fields, a decimal comma.
-double read_number(std::string text, const std::string& where) {
+double read_number(const std::string& text, const std::string& where) {
   std::string with_point = text;
   if (with_point.find('.') == std::string::npos) std::replace(with_point.begin(), with_point.end(), ',', '.');
   const std::optional<double> number = parse_number(with_point);

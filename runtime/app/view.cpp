@@ -38,6 +38,7 @@ void view_recordings(const std::vector<std::filesystem::path>& recordings, Viewe
                      const sigset_t& ends) {
   std::deque<SessionView> sessions;  // first: a broken file is reported even if the port is in use
   std::vector<RunToShow> runs;
+  runs.reserve(recordings.size());
   for (const std::filesystem::path& recording : recordings)
     runs.push_back({sessions.emplace_back(recording), true});
   options.shows = recordings;

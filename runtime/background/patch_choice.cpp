@@ -38,7 +38,8 @@ void PatchRequests::add(const PatchKey& key) noexcept {
 PatchChoice::PatchChoice(const Body& body, const State& state)
     : reach_(tuning.patches.near_edges * body.mean_surface_edge() * body.refinement()),
       tools_(state.tools.size()),
-      touched_(3 * body.most_surface_parts() * state.max_contacts()),
+      touched_(std::size_t{3} * static_cast<std::size_t>(body.most_surface_parts()) *
+               static_cast<std::size_t>(state.max_contacts())),
       share_(touched_.size()) {}
 
 /// Distributes a weight over the body's nodes that a surface node follows.

@@ -28,6 +28,7 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
     if (found != body.fine_surface().number.end()) number[local] = found->second;
   }
   std::vector<Index> result;
+  result.reserve(local_nodes.size());
   for (const Index local : local_nodes) result.push_back(number[local]);
   return result;
 }
