@@ -100,12 +100,9 @@ void LiveMotion::step(const MotionJob& job) {
   Eigen::VectorXd push(live_.dofs());
   put_on(job.load, push);
   displace(job.load, by_load_);
-  LiveReport report = predicted_report_;
-  LiveState next = predicted_;
-  if (push != push_) {
-    next = state_;
-    report = stepper_.step(next, push);
-  }
+  const bool is_predicted = push == push_;
+  LiveState next = is_predicted ? predicted_ : state_;
+  const LiveReport report = is_predicted ? predicted_report_ : stepper_.step(next, push);
   state_ = std::move(next);
   const double error = compare(job, report);
   push_ = std::move(push);
