@@ -48,16 +48,24 @@ void add_smooth(const SmoothPart& smooth, const std::vector<Signs>& r, std::vect
       y[i] += smooth.row(static_cast<std::int64_t>(i))[k] * sums[k];
 }
 
+/// Signs that are drawn by lot for each dof, the same in each run.
+std::vector<Signs> random_signs(std::size_t dofs) {
+  std::mt19937_64 random(31);
+  std::vector<Signs> r(dofs);
+  for (Signs& of_dof : r) {
+    const std::uint64_t bits = random();
+    for (int v = 0; v < vectors; ++v) of_dof[v] = (bits >> v & 1U) != 0 ? 1.0 : -1.0;
+  }
+  return r;
+}
+
 Check check_rows(const PackedGreens& stored, const Factor& factor, const SparseMatrix& K,
                  std::span<const std::int64_t> stored_dofs, const std::string& name) {
-  std::mt19937_64 random(31);
-  std::vector<Signs> r(stored_dofs.size()), y(stored_dofs.size(), Signs::Zero());
+  const std::vector<Signs> r = random_signs(stored_dofs.size());
+  std::vector<Signs> y(r.size(), Signs::Zero());
   Matrix b = Matrix::Zero(factor.order(), vectors);
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    const std::uint64_t bits = random();
-    for (int v = 0; v < vectors; ++v) r[i][v] = (bits >> v & 1U) != 0 ? 1.0 : -1.0;
+  for (std::size_t i = 0; i < r.size(); ++i)
     if (stored_dofs[i] >= 0) b.row(stored_dofs[i]) = r[i].matrix().transpose();
-  }
   Vector squares = Vector::Zero(std::ssize(r));
   if (has_float_entries(stored.precision())) {
     multiply(stored.as<float>(), r, y, squares);

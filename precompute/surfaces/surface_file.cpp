@@ -131,6 +131,12 @@ void read_obj(TextReader& in, PolygonSoup& soup) {
   }
 }
 
+/// Passes over the name of a solid, and in files of one line over all up to the first facet.
+void pass_name_of_solid(TextReader& in) {
+  while (in.on_line())
+    if (in_small_letters(in.word("a name")) == "facet" && in_small_letters(in.peek()) == "normal") return;
+}
+
 /// Reads ASCII STL; words outside facets are names and normals.
 void read_ascii_stl(TextReader& in, PolygonSoup& soup) {
   Polygon corners;
@@ -140,9 +146,7 @@ void read_ascii_stl(TextReader& in, PolygonSoup& soup) {
     if (key == "end") key += in_small_letters(in.word("facet, loop or solid"));
     if (key == "solid" || key == "endsolid") {
       ended = key == "endsolid";
-      while (in.on_line()) {  // a name, and all else in files of one line
-        if (in_small_letters(in.word("a name")) == "facet" && in_small_letters(in.peek()) == "normal") break;
-      }
+      pass_name_of_solid(in);
     } else if (key == "vertex") {
       corners.push_back(soup.points.size());
       add_point(soup, in.point());

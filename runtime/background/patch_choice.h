@@ -18,6 +18,7 @@ struct PatchKey {
   [[nodiscard]] bool empty() const noexcept { return centres[0] < 0; }
   [[nodiscard]] Index count() const noexcept;
   void add(Index centre) noexcept;
+  // NOLINTNEXTLINE(modernize-use-nullptr): the 0 that it sees is the language's
   auto operator<=>(const PatchKey&) const = default;
 };
 

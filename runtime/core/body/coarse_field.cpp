@@ -47,28 +47,22 @@ CoarseField::CoarseField(int dimension, const Vec3& low, const Vec3& high, const
   std::vector<Index> number(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) *
                                 static_cast<std::size_t>(along(dimension, cells, 2)),
                             -1);
-  const auto set_cells = [&](const auto& number_of) {
-    node_.clear();
-    const Index layers = dimension == 3 ? cells[2] : 1;
-    for (Index k = 0; k < layers; ++k) {
-      for (Index j = 0; j < cells[1]; ++j) {
-        for (Index i = 0; i < cells[0]; ++i) {
-          for (Index n = 0; n < 27; ++n) {
-            const bool is_there = dimension == 3 || n < 9;
-            const Index x = 2 * i + n % 3, y = 2 * j + n / 3 % 3, z = 2 * k + n / 9;
-            node_.push_back(is_there ? number_of(static_cast<std::size_t>((z * ny + y) * nx + x)) : -1);
-          }
-        }
-      }
+  const Index layers = dimension == 3 ? cells[2] : 1;
+  for (Index cell = 0; cell < cells[0] * cells[1] * layers; ++cell) {  // by nodes of the whole lattice
+    const Index i = cell % cells[0], j = cell / cells[0] % cells[1], k = cell / cells[0] / cells[1];
+    for (Index n = 0; n < 27; ++n) {
+      const bool is_there = dimension == 3 || n < 9;
+      const Index x = 2 * i + n % 3, y = 2 * j + n / 3 % 3, z = 2 * k + n / 9;
+      node_.push_back(is_there ? (z * ny + y) * nx + x : -1);
     }
-  };
-  set_cells([](std::size_t lattice) { return static_cast<Index>(lattice); });
+  }
   for (const Vec3& x : points) {  // the nodes of cells that hold some
     for_each_node(place(x), [&](Index node, double, const Vec3&) {
       if (number[static_cast<std::size_t>(node)] < 0) number[static_cast<std::size_t>(node)] = nodes_++;
     });
   }
-  set_cells([&](std::size_t lattice) { return number[lattice]; });
+  for (Index& node : node_)
+    if (node >= 0) node = number[static_cast<std::size_t>(node)];
 }
 
 void CoarseField::drop_dependent(std::span<const Vec3> points) {
@@ -166,7 +160,8 @@ CoarseField coarse_field(int dimension, std::span<const Vec3> nodes, Index most_
     return CoarseField(dimension, box.min(), box.max(), cells, nodes);
   };
   std::array<Index, 3> cells = {1, 1, 1}, best = cells;
-  for (double edge = longest; edge > 0.02 * longest; edge *= 0.95) {
+  for (int power = 0; power < 77; ++power) {  // edges from the whole body down to a fiftieth of it
+    const double edge = longest * std::pow(0.95, power);
     std::array<Index, 3> finer = {1, 1, 1};
     for (int axis = 0; axis < dimension; ++axis)
       finer[static_cast<std::size_t>(axis)] =

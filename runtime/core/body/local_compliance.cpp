@@ -296,9 +296,9 @@ void LocalCompliance::measure(const ElasticBody& body) {
   }
 }
 
-/// Finds the reach by the edges of the body's own mesh, and the axes that are free.
-void LocalCompliance::follow(const ElasticBody& body, std::span<const Index> mesh) {
-  const std::size_t of_body = body.surface_stored_nodes().size();
+/// Reach of the body's own nodes, by the edges that meet in each.
+/// \returns the mean edge (m)
+double LocalCompliance::set_reach_by_edges(std::size_t of_body, std::span<const Index> mesh) {
   std::vector<double> sum(of_body, 0.0), count(of_body, 0.0);
   double all = 0.0;
   for (std::size_t s = 0; s < mesh.size(); s += 3) {
@@ -313,9 +313,17 @@ void LocalCompliance::follow(const ElasticBody& body, std::span<const Index> mes
     }
   }
   const double mean = all / static_cast<double>(mesh.size());
+  for (std::size_t node = 0; node < of_body; ++node)
+    points_[node].reach = edges_of_reach * (count[node] > 0.0 ? sum[node] / count[node] : mean);
+  return mean;
+}
+
+/// Finds the reach by the edges of the body's own mesh, and the axes that are free.
+void LocalCompliance::follow(const ElasticBody& body, std::span<const Index> mesh) {
+  const std::size_t of_body = body.surface_stored_nodes().size();
+  const double mean = set_reach_by_edges(of_body, mesh);
   std::vector<Vec3> free(at(body.greens().nodes()), Vec3::Ones());
   for (std::size_t node = 0; node < of_body; ++node) {
-    points_[node].reach = edges_of_reach * (count[node] > 0.0 ? sum[node] / count[node] : mean);
     const Index stored = body.surface_stored_nodes()[node];
     if (stored < 0) continue;
     const Eigen::MatrixXd own = body.greens().block(stored, stored);

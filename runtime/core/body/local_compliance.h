@@ -56,6 +56,7 @@ class LocalCompliance {
 
  private:
   void measure(const ElasticBody& body);
+  double set_reach_by_edges(std::size_t of_body, std::span<const Index> mesh);
   void follow(const ElasticBody& body, std::span<const Index> mesh);
   void fade_at_planes(const ElasticBody& body, const std::vector<Vec3>& free);
 

@@ -200,7 +200,8 @@ void NearField::add_local(const LocalCompliance& local, Index place) noexcept {
     } else if (turns) {
       using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
       const Eigen::Map<const Rows> row(work_.local.data(), 3, width);
-      B = R * row.middleCols<3>(3 * other) * load_.rotation(local.point(node(other))).transpose();
+      B = R * row.middleCols<3>(Eigen::Index{3} * other) *
+          load_.rotation(local.point(node(other))).transpose();
     } else {
       continue;
     }

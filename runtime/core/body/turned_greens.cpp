@@ -47,8 +47,8 @@ class TurnedGreens final : public GreensOnTop {
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
     const auto d = static_cast<std::size_t>(dimension());
-    std::array<double, 3 * turned_forces> turned_force;
-    std::array<double, 3 * turned_nodes> moved;
+    std::array<double, std::size_t{3} * turned_forces> turned_force;
+    std::array<double, std::size_t{3} * turned_nodes> moved;
     std::array<double, most_turned_terms> sum{};  // right^T f
     const Eigen::Index terms = left_.cols();
     for (std::size_t k = 0; k < f.size() && terms > 0; ++k) {

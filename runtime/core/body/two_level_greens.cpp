@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-using Columns = std::array<double, 3 * most_coarse_dofs>;
+using Columns = std::array<double, std::size_t{3} * most_coarse_dofs>;
 
 /// q = A f for a load on few of the dofs.
 void respond_to(const Eigen::MatrixXd& A, const Eigen::Ref<const Eigen::VectorXd>& f,
@@ -219,7 +219,7 @@ class TwoLevelGreens final : public GreensOnTop {
 
 }  // namespace
 
-TwoLevelState at_rest(std::shared_ptr<const CoarseNodes> nodes) {
+TwoLevelState at_rest(const std::shared_ptr<const CoarseNodes>& nodes) {
   return {
       .nodes = nodes, .turns = std::vector<CoarseTurn>(nodes->place.size()), .H_inverse = nodes->compliance};
 }

@@ -53,7 +53,7 @@ struct TwoLevelState {
 };
 
 /// The state of a body at rest, where they are Xi.
-[[nodiscard]] TwoLevelState at_rest(std::shared_ptr<const CoarseNodes> nodes);
+[[nodiscard]] TwoLevelState at_rest(const std::shared_ptr<const CoarseNodes>& nodes);
 
 /// Makes it of Xi, which may be another one for each of several.
 std::shared_ptr<const Greens> two_levels(std::shared_ptr<const Greens> Xi, TwoLevelState state);
