@@ -47,7 +47,7 @@ Mat3 nearest_rotation(const Mat3& F) noexcept {
     const Mat3 next = 0.5 * (scale * R + inverse / scale);
     const double change = (next - R).squaredNorm();
     R = next;
-    if (change < 1e-24) return R;  // quadratic: the error is now below rounding
+    if (change < 1e-15) return R;  // quadratic: the error is now below rounding
   }
   return R;
 }

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double least_step = 0.005;  // [s]
 constexpr double most_step = 0.1;     // [s] of a hand: as long as the tick foresees its motion
-// A step of the demo's liver takes 40 ms, of one with 20 000 surface nodes 100 ms, where coarse bodies have
-// 400 dofs.
-constexpr double of_coarse_body = 0.02, of_node = 4e-6;  // [s]
+// A step of the demo's liver takes 10 to 40 ms, of one with 20 000 surface nodes 30 to 80 ms, where coarse
+// bodies have 400 dofs.
+constexpr double of_coarse_body = 0.02, of_node = 2e-6;  // [s]
 
 /// Time that a step takes [s].
 double step_of(const Model& model) noexcept {

@@ -23,7 +23,8 @@ constexpr int most_halvings = 30;
 constexpr double most_of_cell = 0.3;     // of its edge, by which a coarse node moves in a step at most
 constexpr double rounding = 1e-9;        // of the largest q: a step that is not made
 constexpr double least_stiffness = 0.2;  // of the coarse field in the tick, as a share of that at rest
-constexpr double most_lag = 0.05;        // share of q, in the norm of K_c, by which the tangent of E may lag
+constexpr double most_lag = 0.1;         // of the tangent of E in a search, as a share of it
+constexpr double most_lag_of_W = 0.03;   // of the tangent of E in W
 
 /// Groups of points: the group of each, the first ones being those farthest from all before.
 std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
@@ -61,7 +62,10 @@ MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
       share = std::max(0.1, 1.5 * share);
     factor.compute(A + share * K);
   }
-  return factor.solve(MatrixXd::Identity(A.rows(), A.cols()));
+  const MatrixXd root = factor.matrixL().solve(MatrixXd::Identity(A.rows(), A.cols()));
+  MatrixXd inverse = MatrixXd::Zero(A.rows(), A.cols());
+  inverse.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose());
+  return inverse.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace
@@ -113,6 +117,7 @@ void TwoLevels::rest() {
   q_tangent_ = q_;
   dE_ = q_;
   E_ = parts_->body->energy(q_, &dE_);
+  dE_tangent_ = dE_;
   loaded_.clear();
   forces_.clear();
   columns_.clear();
@@ -271,10 +276,17 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
   return H;
 }
 
-void TwoLevels::renew_tangent() {
-  if (q_tangent_ == q_) return;
+/// Has the tangent of E at q, where dE is E's derivative, unless the present one is off by `most` of it or
+/// less.
+void TwoLevels::renew_tangent(const VectorXd& dE, double most) {
+  const VectorXd foreseen = tangent_ * (q_ - q_tangent_), missed = dE - dE_tangent_ - foreseen;
+  // The secant is off by half of what the tangent is off by.
+  if (4.0 * missed.dot(parts_->nodes->compliance * missed) <=
+      most * most * foreseen.dot(parts_->nodes->compliance * foreseen))
+    return;
   tangent_ = parts_->body->tangent(q_);
   q_tangent_ = q_;
+  dE_tangent_ = dE;
 }
 
 /// Takes nodes as loaded, with the remainder's compliance between them.
@@ -319,8 +331,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
   MatrixXd J;
   const double smallest = std::numeric_limits<double>::min();
   for (;; ++report.steps) {
-    const VectorXd since = q_ - q_tangent_;
-    if (since.dot(parts_->K * since) > most_lag * most_lag * q_.dot(parts_->K * q_)) renew_tangent();
+    renew_tangent(at.dE, most_lag);
     H_ = hessian(contact, at, &J);
     MatrixXd A = H_;
     if (!loaded_.empty()) {
@@ -410,7 +421,7 @@ void TwoLevels::find_displacement() {
 
 TwoLevelState TwoLevels::state(std::vector<Index> near) {
   H_ -= tangent_;
-  renew_tangent();
+  renew_tangent(dE_, most_lag_of_W);
   H_ += tangent_;
   return {.nodes = parts_->nodes,
           .turns = turns_,

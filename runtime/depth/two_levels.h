@@ -59,7 +59,7 @@ class TwoLevels {
 
   [[nodiscard]] AtNode at_node(Index node, const Eigen::VectorXd& q) const;
   void set_loaded(std::span<const Index> nodes);
-  void renew_tangent();
+  void renew_tangent(const Eigen::VectorXd& dE, double most);
   template <class Visit>
   void for_each_weight(Index node, const Visit& visit) const;
   void find_remainder(const Look& at);
@@ -72,7 +72,7 @@ class TwoLevels {
   const CoarseParts* parts_;
   std::shared_ptr<const Greens> greens_;
   int dimension_;
-  Eigen::VectorXd q_, q_tangent_;  // q_tangent_: where `tangent_` is that of E
+  Eigen::VectorXd q_, q_tangent_, dE_tangent_;  // where `tangent_` is that of E, and its derivative there
   Eigen::MatrixXd tangent_;
   double largest_q_ = 0.0;  // so far, in the norm of K_c
   double E_ = 0.0;          // energy of the coarse body at q_, and its derivative

@@ -8,7 +8,8 @@
 namespace palpate {
 namespace {
 
-constexpr Index turned_forces = 128, turned_nodes = 64;  // of a part of a product
+constexpr std::size_t turned_forces = 128;  // of a part of a product
+constexpr Index turned_nodes = 64;
 
 class TurnedGreens final : public GreensOnTop {
  public:
@@ -43,50 +44,64 @@ class TurnedGreens final : public GreensOnTop {
     }
   }
 
-  /// Processes parts of the forces and nodes that fit on the stack.
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
     const auto d = static_cast<std::size_t>(dimension());
-    std::array<double, std::size_t{3} * turned_forces> turned_force;
-    std::array<double, std::size_t{3} * turned_nodes> moved;
+    std::array<double, std::size_t{3} * turned_forces> turned;
+    std::size_t count = turn_back(nodes, f, 0, turned);
+    below().displacement(nodes.first(count), {turned.data(), d * count}, ranges, u);
+    for (std::size_t begin = count; begin < nodes.size(); begin += count) {
+      count = turn_back(nodes, f, begin, turned);
+      add_displacement(nodes.subspan(begin, count), {turned.data(), d * count}, ranges, u);
+    }
     std::array<double, most_turned_terms> sum{};  // right^T f
     const Eigen::Index terms = left_.cols();
     for (std::size_t k = 0; k < f.size() && terms > 0; ++k) {
       const auto dof = static_cast<Eigen::Index>(d) * nodes[k / d] + static_cast<Eigen::Index>(k % d);
       add(right_.row(dof).data(), f[k], sum.data(), terms);
     }
-    double* out = u.data();
+    Index place = 0;
     for (const NodeRange& range : ranges) {
-      for (Index first = range.first; first < range.end; first += turned_nodes) {
-        const NodeRange part{first, std::min<Index>(first + turned_nodes, range.end)};
-        const std::size_t dofs = d * static_cast<std::size_t>(part.end - part.first);
-        std::fill_n(out, dofs, 0.0);
-        for (std::size_t begin = 0; begin < nodes.size(); begin += turned_forces) {
-          const std::size_t count = std::min<std::size_t>(turned_forces, nodes.size() - begin);
-          for (std::size_t k = 0; k < count; ++k) {
-            const Mat3& R = rotations_[static_cast<std::size_t>(nodes[begin + k])];
-            const Eigen::Vector3d force =
-                R.transpose() * vector_at(f, dimension(), static_cast<Index>(begin + k));
-            set_vector(turned_force, dimension(), static_cast<Index>(k), force);
-          }
-          below().displacement(nodes.subspan(begin, count), {turned_force.data(), d * count}, {&part, 1},
-                               {moved.data(), dofs});
-          for (std::size_t k = 0; k < dofs; ++k) out[k] += moved[k];
+      for (Index node = range.first; node < range.end; ++node, ++place) {
+        const Mat3& R = rotations_[static_cast<std::size_t>(node)];
+        set_vector(u, dimension(), place, R * vector_at(u, dimension(), place));
+        for (std::size_t axis = 0; axis < d && terms > 0; ++axis) {
+          const auto dof = static_cast<Eigen::Index>(d) * node + static_cast<Eigen::Index>(axis);
+          u[d * static_cast<std::size_t>(place) + axis] += dot(left_.row(dof).data(), sum.data(), terms);
         }
-        const std::span<double> slice(out, dofs);
-        for (Index k = 0; k < part.end - part.first; ++k) {
-          const Mat3& R = rotations_[static_cast<std::size_t>(first + k)];
-          set_vector(slice, dimension(), k, R * vector_at(slice, dimension(), k));
-        }
-        for (std::size_t k = 0; k < dofs && terms > 0; ++k)
-          out[k] += dot(left_.row(static_cast<Eigen::Index>(d) * first + static_cast<Eigen::Index>(k)).data(),
-                        sum.data(), terms);
-        out += dofs;
       }
     }
   }
 
  private:
+  /// Forces from `begin` on, as many as fit, in the frames of their nodes; how many they are.
+  std::size_t turn_back(std::span<const Index> nodes, std::span<const double> f, std::size_t begin,
+                        std::span<double> turned) const noexcept {
+    const std::size_t count = std::min(turned_forces, nodes.size() - begin);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Mat3& R = rotations_[static_cast<std::size_t>(nodes[begin + k])];
+      const Vec3 force = R.transpose() * vector_at(f, dimension(), static_cast<Index>(begin + k));
+      set_vector(turned, dimension(), static_cast<Index>(k), force);
+    }
+    return count;
+  }
+
+  /// Adds what forces in the frames of their nodes do, by parts of the nodes that fit on the stack.
+  void add_displacement(std::span<const Index> nodes, std::span<const double> f,
+                        std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
+    std::array<double, std::size_t{3} * turned_nodes> moved;
+    double* out = u.data();
+    for (const NodeRange& range : ranges) {
+      for (Index first = range.first; first < range.end; first += turned_nodes) {
+        const NodeRange part{first, std::min<Index>(first + turned_nodes, range.end)};
+        const auto dofs = static_cast<std::size_t>(dimension() * (part.end - part.first));
+        below().displacement(nodes, f, {&part, 1}, {moved.data(), dofs});
+        for (std::size_t k = 0; k < dofs; ++k) out[k] += moved[k];
+        out += dofs;
+      }
+    }
+  }
+
   using Terms = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   std::vector<Mat3> rotations_;  // [nodes]

@@ -258,15 +258,23 @@ TEST_F(TwoLevelBar, ComplianceIsTheDerivative) {
     EXPECT_GT(change.norm(), 0.5);
     EXPECT_LT((C * by_force - change).norm(), 0.02 * change.norm()) << dof;
   }
-  // displacement() is gather() summed, for nodes that are prepared and those that are not
-  std::vector<double> all(static_cast<std::size_t>(W->order()));
-  W->displacement(nodes, f, all);
-  for (Index node = 0; node < W->nodes(); node += 7) {
-    Vec3 by_blocks = Vec3::Zero();
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-      by_blocks += W->block(node, nodes[k]) * vector_at(f, 3, static_cast<Index>(k));
-    EXPECT_LT((by_blocks - vector_at(all, 3, node)).norm(), 1e-9 * by_blocks.norm());
+  // displacement() is gather() summed, for nodes that are prepared and those that are not, few and many
+  for (const bool all_are_loaded : {false, true}) {
+    while (all_are_loaded && std::ssize(nodes) < W->nodes()) {
+      nodes.push_back(static_cast<Index>(std::ssize(nodes)));
+      for (const double force : {1.0, -2.0, 0.5})
+        f.push_back(1e-3 * force * std::cos(static_cast<double>(nodes.size())));
+    }
+    std::vector<double> all(static_cast<std::size_t>(W->order()));
+    W->displacement(nodes, f, all);
+    for (Index node = 0; node < W->nodes(); node += 7) {
+      Vec3 by_blocks = Vec3::Zero();
+      for (std::size_t k = 0; k < nodes.size(); ++k)
+        by_blocks += W->block(node, nodes[k]) * vector_at(f, 3, static_cast<Index>(k));
+      EXPECT_LT((by_blocks - vector_at(all, 3, node)).norm(), 1e-9 * by_blocks.norm());
+    }
   }
+  ASSERT_GT(nodes.size(), 128U);  // more than are turned at a time
 }
 
 // The energy of a field that turns the body as a whole is 0, and its tangent is the gradient's derivative.
