@@ -116,11 +116,68 @@ CoarseValue value_of(const Index* node, const CoarsePlace& at, const double* q) 
   return sum;
 }
 
+template <int D>
+Vec3 displacement_of(const Index* node, const CoarsePlace& at, const double* q) noexcept {
+  Vec3 u = Vec3::Zero();
+  for (int c = 0; c < (D == 3 ? 3 : 1); ++c) {
+    Vec3 plane = Vec3::Zero();
+    for (int b = 0; b < 3; ++b) {
+      Vec3 line = Vec3::Zero();
+      for (int a = 0; a < 3; ++a) {
+        const Index number = node[9 * c + 3 * b + a];
+        if (number < 0) continue;
+        const double* const q_node = q + std::ptrdiff_t{D} * number;
+        for (int axis = 0; axis < D; ++axis) line[axis] += at.value[a].x() * q_node[axis];
+      }
+      plane += at.value[b].y() * line;
+    }
+    u += at.value[c].z() * plane;
+  }
+  return u;
+}
+
 }  // namespace
 
 CoarseValue CoarseField::value(const CoarsePlace& at, std::span<const double> q) const noexcept {
-  const Index* node = node_.data() + std::ptrdiff_t{at.cell} * 27;
+  const Index* const node = nodes_of(at);
   return dimension_ == 3 ? value_of<3>(node, at, q.data()) : value_of<2>(node, at, q.data());
+}
+
+Vec3 CoarseField::displacement(const CoarsePlace& at, std::span<const double> q) const noexcept {
+  const Index* const node = nodes_of(at);
+  return dimension_ == 3 ? displacement_of<3>(node, at, q.data()) : displacement_of<2>(node, at, q.data());
+}
+
+std::pair<CoarseValue, Vec3> CoarseField::both(const CoarsePlace& at,
+                                               std::span<const double> q_and_p) const noexcept {
+  using Lanes = Eigen::Array<double, 8, 1>;
+  const Index* const node = nodes_of(at);
+  Lanes u = Lanes::Zero(), by_x = u, by_y = u, by_z = u;
+  for (int c = 0; c < 3; ++c) {
+    Lanes plane = Lanes::Zero(), along_x = plane, along_y = plane;
+    for (int b = 0; b < 3; ++b) {
+      Lanes line = Lanes::Zero(), slope = line;
+      for (int a = 0; a < 3; ++a) {
+        const Index number = node[9 * c + 3 * b + a];
+        if (number < 0) continue;
+        const Eigen::Map<const Lanes> of_node(q_and_p.data() + std::ptrdiff_t{8} * number);
+        line += at.value[a].x() * of_node;
+        slope += at.slope[a].x() * of_node;
+      }
+      plane += at.value[b].y() * line;
+      along_x += at.value[b].y() * slope;
+      along_y += at.slope[b].y() * line;
+    }
+    u += at.value[c].z() * plane;
+    by_x += at.value[c].z() * along_x;
+    by_y += at.value[c].z() * along_y;
+    by_z += at.slope[c].z() * plane;
+  }
+  std::pair<CoarseValue, Vec3> values;
+  values.first.u = u.head<3>();
+  values.first.gradient << by_x.head<3>(), by_y.head<3>(), by_z.head<3>();
+  values.second = u.segment<3>(4);
+  return values;
 }
 
 CoarsePlace CoarseField::place(const Vec3& x) const noexcept {

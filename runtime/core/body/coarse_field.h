@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/vectors.h"
@@ -50,11 +51,17 @@ class CoarseField {
 
   /// P q and its gradient.
   [[nodiscard]] CoarseValue value(const CoarsePlace& at, std::span<const double> q) const noexcept;
+  /// P q [m].
+  [[nodiscard]] Vec3 displacement(const CoarsePlace& at, std::span<const double> q) const noexcept;
+  /// P q and its gradient, and P p, of fields in space side by side: [q_x q_y q_z 0 p_x p_y p_z 0] of each
+  /// node.
+  [[nodiscard]] std::pair<CoarseValue, Vec3> both(const CoarsePlace& at,
+                                                  std::span<const double> q_and_p) const noexcept;
 
   /// Calls visit(node, weight, gradient) for each node of the place's cell: P and its gradient [1/m] there.
   template <class Visit>
   void for_each_node(const CoarsePlace& at, const Visit& visit) const noexcept {
-    const Index* node = node_.data() + std::ptrdiff_t{at.cell} * 27;
+    const Index* const node = nodes_of(at);
     for (int c = 0; c < (dimension_ == 3 ? 3 : 1); ++c) {
       for (int b = 0; b < 3; ++b) {
         for (int a = 0; a < 3; ++a) {
@@ -69,6 +76,10 @@ class CoarseField {
   }
 
  private:
+  [[nodiscard]] const Index* nodes_of(const CoarsePlace& at) const noexcept {
+    return node_.data() + std::ptrdiff_t{at.cell} * 27;
+  }
+
   int dimension_;
   Vec3 low_, edge_;
   std::array<Index, 3> cells_;

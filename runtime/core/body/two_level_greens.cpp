@@ -11,12 +11,12 @@
 namespace palpate {
 namespace {
 
+using Column = std::array<double, most_coarse_dofs>;
 using Columns = std::array<double, std::size_t{3} * most_coarse_dofs>;
 
-/// q = A f for a load on few of the dofs.
-void respond_to(const Eigen::MatrixXd& A, const Eigen::Ref<const Eigen::VectorXd>& f,
-                Eigen::Ref<Eigen::VectorXd> q) noexcept {
-  q.setZero();
+/// Adds A f for a load on few of the dofs.
+void add_response(const Eigen::MatrixXd& A, const Eigen::Ref<const Eigen::VectorXd>& f,
+                  Eigen::Ref<Eigen::VectorXd> q) noexcept {
   for (Eigen::Index dof = 0; dof < f.size(); ++dof) {
     if (f[dof] != 0.0) q += f[dof] * A.col(dof);
   }
@@ -28,11 +28,11 @@ class TwoLevelGreens final : public GreensOnTop {
       : GreensOnTop(std::move(turned)),
         state_(std::move(state)),
         column_of_(state_.turns.size(), -1),
-        near_of_(state_.turns.size(), -1) {
-    for (std::size_t k = 0; k < state_.columns.size(); ++k) {
+        prepared_of_(column_of_),
+        near_of_(column_of_) {
+    for (std::size_t k = 0; k < state_.columns.size(); ++k)
       column_of_[static_cast<std::size_t>(state_.columns[k].node)] = static_cast<Index>(k);
-      answers_.emplace_back(state_.H_inverse * state_.columns[k].J);
-    }
+    prepare_answers();
     prepare_near();
   }
 
@@ -63,20 +63,28 @@ class TwoLevelGreens final : public GreensOnTop {
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept override {
     below().displacement(nodes, f, ranges, u);
-    Columns load_at_rest, load, a, b;
+    Column a, b;
     const Eigen::Index n = state_.H_inverse.rows();
-    Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n), q_rest(a.data(), n),
-        q(b.data(), n);
-    find_loads(nodes, f, P_f, J_f);
-    if (P_f.isZero(0.0) && J_f.isZero(0.0)) return;
-    respond_to(state_.nodes->compliance, P_f, q_rest);
-    respond_to(state_.H_inverse, J_f, q);
+    Eigen::Map<Eigen::VectorXd> q_rest(a.data(), n), q(b.data(), n);
+    find_fields(nodes, f, q_rest, q);
+    if (q_rest.isZero(0.0) && q.isZero(0.0)) return;
     const std::span<const double> of_q(q.data(), static_cast<std::size_t>(n)),
         of_rest(q_rest.data(), static_cast<std::size_t>(n));
+    std::array<double, std::size_t{8} * most_coarse_dofs / 3> both;
+    for (Eigen::Index k = 0; 3 * k < n && dimension() == 3; ++k)
+      Eigen::Map<Eigen::Matrix<double, 4, 2>>(both.data() + 8 * k) << q.segment<3>(3 * k),
+          q_rest.segment<3>(3 * k), 0.0, 0.0;
     Index out = 0;
     for (const NodeRange& range : ranges) {
       for (Index node = range.first; node < range.end; ++node, ++out) {
-        const Vec3 moved_by = moved(node, of_q) - at_rest(node, of_rest);
+        const auto stored = static_cast<std::size_t>(node);
+        Vec3 moved_by;
+        if (dimension() == 3 && column_of_[stored] < 0) {
+          const auto [at, rest] = state_.nodes->field.both(state_.nodes->place[stored], both);
+          moved_by = moved(node, at) - state_.turns[stored].R * free_part(node, rest);
+        } else {
+          moved_by = moved(node, of_q) - at_rest(node, of_rest);
+        }
         set_vector(u, dimension(), out, vector_at(u, dimension(), out) + moved_by);
       }
     }
@@ -84,35 +92,62 @@ class TwoLevelGreens final : public GreensOnTop {
 
   void coarse_displacement(std::span<const Index> nodes, std::span<const double> f,
                            std::span<double> q) const noexcept override {
-    Columns load_at_rest, load;
+    Column at_rest;
     const Eigen::Index n = state_.H_inverse.rows();
-    Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n);
-    find_loads(nodes, f, P_f, J_f);
-    respond_to(state_.H_inverse, J_f, Eigen::Map<Eigen::VectorXd>(q.data(), n));
+    find_fields(nodes, f, Eigen::Map<Eigen::VectorXd>(at_rest.data(), n),
+                Eigen::Map<Eigen::VectorXd>(q.data(), n));
   }
 
  private:
-  /// P^T R^T f and J^T f.
-  void find_loads(std::span<const Index> nodes, std::span<const double> f, Eigen::Ref<Eigen::VectorXd> P_f,
-                  Eigen::Ref<Eigen::VectorXd> J_f) const noexcept {
+  /// K_c^-1 P^T R^T f and H^-1 J^T f.
+  void find_fields(std::span<const Index> nodes, std::span<const double> f,
+                   Eigen::Ref<Eigen::VectorXd> q_rest, Eigen::Ref<Eigen::VectorXd> q) const noexcept {
+    Column load_at_rest, load;
+    const Eigen::Index n = state_.H_inverse.rows();
+    Eigen::Map<Eigen::VectorXd> P_f(load_at_rest.data(), n), J_f(load.data(), n);
     P_f.setZero();
     J_f.setZero();
+    q_rest.setZero();
+    q.setZero();
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
+      if (const Index p = prepared_of_[static_cast<std::size_t>(nodes[k])]; p >= 0) {
+        for (Eigen::Index axis = 0; axis < dimension(); ++axis) {
+          q_rest += force[axis] * by_rest_.col(dimension() * p + axis);
+          q += force[axis] * by_tangent_.col(dimension() * p + axis);
+        }
+        continue;
+      }
       for_each_block(nodes[k], [&](Index node, double weight, const Vec3& gradient) {
         add_forces(nodes[k], node, weight, gradient, force, P_f, J_f);
       });
-      if (const Index c = column_of_[static_cast<std::size_t>(nodes[k])]; c >= 0) {
-        for (Eigen::Index axis = 0; axis < dimension(); ++axis)
-          J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
-      }
     }
+    add_response(state_.nodes->compliance, P_f, q_rest);
+    add_response(state_.H_inverse, J_f, q);
   }
 
   /// K_c^-1 P^T R^T and H^-1 J^T of a node [n_q x d].
   struct Answer {
-    Eigen::Map<Eigen::MatrixXd> by_rest, by_tangent;
+    Eigen::Map<const Eigen::MatrixXd> by_rest, by_tangent;
   };
+
+  /// Answers of the columns' nodes and of those near.
+  void prepare_answers() {
+    std::vector<Index> prepared;
+    for (const CoarseColumn& column : state_.columns) prepared.push_back(column.node);
+    for (const Index node : state_.near)
+      if (column_of_[static_cast<std::size_t>(node)] < 0) prepared.push_back(node);
+    const Eigen::Index d = dimension(), n = state_.H_inverse.rows();
+    by_rest_.setZero(n, d * std::ssize(prepared));
+    by_tangent_.setZero(n, d * std::ssize(prepared));
+    for (std::size_t k = 0; k < prepared.size(); ++k) {
+      const Eigen::Index first = d * static_cast<Eigen::Index>(k);
+      add_answer(prepared[k], by_rest_.middleCols(first, d), by_tangent_.middleCols(first, d));
+      if (k < state_.columns.size())
+        by_tangent_.middleCols(first, d).noalias() = state_.H_inverse * state_.columns[k].J;
+      prepared_of_[static_cast<std::size_t>(prepared[k])] = static_cast<Index>(k);
+    }
+  }
 
   void prepare_near() {
     const Eigen::Index d = dimension();
@@ -151,48 +186,50 @@ class TwoLevelGreens final : public GreensOnTop {
     return {(axes & 1U) != 0 ? v.x() : 0.0, (axes & 2U) != 0 ? v.y() : 0.0, (axes & 4U) != 0 ? v.z() : 0.0};
   }
 
-  /// Adds P^T R^T f and, without the node's column, J^T f of a coarse node.
+  /// Adds P^T R^T f and J^T f of a coarse node, for a node without a column.
   void add_forces(Index stored, Index node, double weight, const Vec3& gradient, const Vec3& force,
                   Eigen::Ref<Eigen::VectorXd> P_f, Eigen::Ref<Eigen::VectorXd> J_f) const noexcept {
     const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
     const Eigen::Index d = dimension();
     P_f.segment(d * node, d) += weight * free_part(stored, turn.R.transpose() * force).head(d);
-    if (column_of_[static_cast<std::size_t>(stored)] >= 0) return;
     const Vec3 by_turn = turn.R * gradient.cross(turn.T.transpose() * force);
     J_f.segment(d * node, d) += (weight * free_part(stored, force) + by_turn).head(d);
   }
 
-  [[nodiscard]] Answer respond(Index row, Columns& by_rest, Columns& by_tangent) const noexcept {
-    const Eigen::Index d = dimension(), n = state_.H_inverse.rows();
-    Answer answer{{by_rest.data(), n, d}, {by_tangent.data(), n, d}};
-    answer.by_rest.setZero();
-    const Index column = column_of_[static_cast<std::size_t>(row)];
-    if (column >= 0)
-      answer.by_tangent = answers_[static_cast<std::size_t>(column)];
-    else
-      answer.by_tangent.setZero();
-    const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(row)];
-    for_each_block(row, [&](Index node, double weight, const Vec3& gradient) {
+  /// Adds the answer of a node without a column.
+  void add_answer(Index stored, Eigen::Ref<Eigen::MatrixXd> by_rest,
+                  Eigen::Ref<Eigen::MatrixXd> by_tangent) const noexcept {
+    const Eigen::Index d = dimension();
+    const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
+    for_each_block(stored, [&](Index node, double weight, const Vec3& gradient) {
       for (Eigen::Index axis = 0; axis < d; ++axis) {
         const Vec3 unit = Vec3::Unit(axis);
-        const Vec3 p = weight * free_part(row, turn.R.transpose() * unit);
-        const Vec3 j = weight * free_part(row, unit) + turn.R * gradient.cross(turn.T.transpose() * unit);
+        const Vec3 p = weight * free_part(stored, turn.R.transpose() * unit);
+        const Vec3 j = weight * free_part(stored, unit) + turn.R * gradient.cross(turn.T.transpose() * unit);
         for (Eigen::Index i = 0; i < d; ++i) {
-          answer.by_rest.col(axis) += p[i] * state_.nodes->compliance.col(d * node + i);
-          if (column < 0) answer.by_tangent.col(axis) += j[i] * state_.H_inverse.col(d * node + i);
+          by_rest.col(axis) += p[i] * state_.nodes->compliance.col(d * node + i);
+          by_tangent.col(axis) += j[i] * state_.H_inverse.col(d * node + i);
         }
       }
     });
-    return answer;
   }
 
-  [[nodiscard]] CoarseValue value(Index stored, std::span<const double> q) const noexcept {
-    return state_.nodes->field.value(state_.nodes->place[static_cast<std::size_t>(stored)], q);
+  /// Answer of any node; a and b keep one that is not prepared.
+  [[nodiscard]] Answer respond(Index row, Columns& a, Columns& b) const noexcept {
+    const Eigen::Index d = dimension(), n = state_.H_inverse.rows();
+    if (const Index k = prepared_of_[static_cast<std::size_t>(row)]; k >= 0)
+      return {{by_rest_.col(d * k).data(), n, d}, {by_tangent_.col(d * k).data(), n, d}};
+    Eigen::Map<Eigen::MatrixXd> by_rest(a.data(), n, d), by_tangent(b.data(), n, d);
+    by_rest.setZero();
+    by_tangent.setZero();
+    add_answer(row, by_rest, by_tangent);
+    return {{a.data(), n, d}, {b.data(), n, d}};
   }
 
   /// R P q of a node.
   [[nodiscard]] Vec3 at_rest(Index stored, std::span<const double> q) const noexcept {
-    return state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, value(stored, q).u);
+    const Vec3 u = state_.nodes->field.displacement(state_.nodes->place[static_cast<std::size_t>(stored)], q);
+    return state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, u);
   }
 
   /// J q of a node.
@@ -204,7 +241,11 @@ class TwoLevelGreens final : public GreensOnTop {
       for (Eigen::Index i = 0; i < dimension(); ++i) sum[i] = J.col(i).dot(all);
       return sum;
     }
-    const CoarseValue at = value(stored, q);
+    return moved(stored, state_.nodes->field.value(state_.nodes->place[static_cast<std::size_t>(stored)], q));
+  }
+
+  /// J q of a node without a column.
+  [[nodiscard]] Vec3 moved(Index stored, const CoarseValue& at) const noexcept {
     const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
     const Mat3 A = turn.R.transpose() * at.gradient;
     const Vec3 curl(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
@@ -212,9 +253,9 @@ class TwoLevelGreens final : public GreensOnTop {
   }
 
   TwoLevelState state_;
-  std::vector<Index> column_of_, near_of_;  // [nodes] in state_.columns and near; -1: none
-  std::vector<Eigen::MatrixXd> answers_;    // [columns] H^-1 J^T
-  Eigen::MatrixXd near_;                    // [d near, d near] the coarse field's part
+  std::vector<Index> column_of_, prepared_of_, near_of_;  // [nodes] in state_.columns, those below; -1: none
+  Eigen::MatrixXd by_rest_, by_tangent_;                  // [n_q x d prepared] answers
+  Eigen::MatrixXd near_;                                  // [d near, d near] the coarse field's part
 };
 
 }  // namespace

@@ -233,7 +233,8 @@ TEST_F(TwoLevelBar, ComplianceIsTheDerivative) {
     levels.find(nodes, f, there, 1e-10, 60);
     f = levels.forces();
   }
-  const auto W = two_levels(body.shared_greens(), levels.state({tip}));
+  const Index beside = stored_at(model, Vec3(0.5 * length, 0.0, 0.0));  // prepared, and not loaded
+  const auto W = two_levels(body.shared_greens(), levels.state({tip, beside}));
   Eigen::MatrixXd C(9, 9);
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b)
