@@ -109,9 +109,10 @@ class TwoLevelGreens final : public GreensOnTop {
     J_f.setZero();
     q_rest.setZero();
     q.setZero();
+    const bool are_few = dimension() * std::ssize(nodes) < n / 2;  // else their answers are more than H^-1
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
-      if (const Index p = prepared_of_[static_cast<std::size_t>(nodes[k])]; p >= 0) {
+      if (const Index p = prepared_of_[static_cast<std::size_t>(nodes[k])]; p >= 0 && are_few) {
         for (Eigen::Index axis = 0; axis < dimension(); ++axis) {
           q_rest += force[axis] * by_rest_.col(dimension() * p + axis);
           q += force[axis] * by_tangent_.col(dimension() * p + axis);
@@ -121,6 +122,10 @@ class TwoLevelGreens final : public GreensOnTop {
       for_each_block(nodes[k], [&](Index node, double weight, const Vec3& gradient) {
         add_forces(nodes[k], node, weight, gradient, force, P_f, J_f);
       });
+      if (const Index c = column_of_[static_cast<std::size_t>(nodes[k])]; c >= 0) {
+        for (Eigen::Index axis = 0; axis < dimension(); ++axis)
+          J_f += force[axis] * state_.columns[static_cast<std::size_t>(c)].J.col(axis);
+      }
     }
     add_response(state_.nodes->compliance, P_f, q_rest);
     add_response(state_.H_inverse, J_f, q);
@@ -186,12 +191,13 @@ class TwoLevelGreens final : public GreensOnTop {
     return {(axes & 1U) != 0 ? v.x() : 0.0, (axes & 2U) != 0 ? v.y() : 0.0, (axes & 4U) != 0 ? v.z() : 0.0};
   }
 
-  /// Adds P^T R^T f and J^T f of a coarse node, for a node without a column.
+  /// Adds P^T R^T f and, without the node's column, J^T f of a coarse node.
   void add_forces(Index stored, Index node, double weight, const Vec3& gradient, const Vec3& force,
                   Eigen::Ref<Eigen::VectorXd> P_f, Eigen::Ref<Eigen::VectorXd> J_f) const noexcept {
     const CoarseTurn& turn = state_.turns[static_cast<std::size_t>(stored)];
     const Eigen::Index d = dimension();
     P_f.segment(d * node, d) += weight * free_part(stored, turn.R.transpose() * force).head(d);
+    if (column_of_[static_cast<std::size_t>(stored)] >= 0) return;
     const Vec3 by_turn = turn.R * gradient.cross(turn.T.transpose() * force);
     J_f.segment(d * node, d) += (weight * free_part(stored, force) + by_turn).head(d);
   }
