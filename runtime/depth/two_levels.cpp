@@ -24,7 +24,7 @@ constexpr double most_of_cell = 0.3;     // of its edge, by which a coarse node 
 constexpr double rounding = 1e-9;        // of the largest q: a step that is not made
 constexpr double least_stiffness = 0.2;  // of the coarse field in the tick, as a share of that at rest
 constexpr double most_lag = 0.1;         // of the tangent of E in a search, as a share of it
-constexpr double most_lag_of_W = 0.03;   // of the tangent of E in W
+constexpr double most_lag_of_compliance = 0.03;  // of the tangent of E in W
 
 /// Groups of points: the group of each, the first ones being those farthest from all before.
 std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
@@ -32,7 +32,7 @@ std::vector<Index> grouped(const std::vector<Vec3>& points, Index most) {
   std::vector<double> distance(points.size(), std::numeric_limits<double>::infinity());
   std::size_t next = 0;
   for (Index g = 0; g < std::min<Index>(most, static_cast<Index>(points.size())); ++g) {
-    const Vec3 centre = points[next];
+    const Vec3& centre = points[next];
     for (std::size_t k = 0; k < points.size(); ++k) {
       const double there = (points[k] - centre).squaredNorm();
       if (there >= distance[k]) continue;
@@ -177,7 +177,6 @@ void TwoLevels::look(const Contact& contact, const VectorXd& q, Look& at) const 
   at.V.setZero(3 * k_all, d * contact.groups);
   VectorXd f0(3 * k_all), phi0(3 * k_all), along = VectorXd::Zero(3 * k_all),
                                            A_off = VectorXd::Zero(d * contact.groups);
-  const CoarseNodes& coarse = *parts_->nodes;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
     const auto [moved, R, G] = at_node(node, q);
@@ -211,7 +210,14 @@ void TwoLevels::look(const Contact& contact, const VectorXd& q, Look& at) const 
   for (Eigen::Index k = 0; k < k_all; ++k)
     at.f.segment<3>(3 * k).head(d) += contact.share[static_cast<std::size_t>(k)] *
                                       lambda.segment(d * contact.group[static_cast<std::size_t>(k)], d);
-  for (Eigen::Index k = 0; k < k_all; ++k) {
+  add_moments(at);
+}
+
+/// Adds to the gradient what the forces do at the nodes, and their moment on the remainder.
+void TwoLevels::add_moments(Look& at) const {
+  const Eigen::Index d = dimension_;
+  const CoarseNodes& coarse = *parts_->nodes;
+  for (Eigen::Index k = 0; k < std::ssize(loaded_); ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
     const Vec3 force = at.f.segment<3>(3 * k);
     const Vec3 torque = at.s.segment<3>(3 * k).cross(at.phi.segment<3>(3 * k));
@@ -236,7 +242,7 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
   const auto k_all = std::ssize(loaded_);
   if (k_all == 0) return H;
   const auto n = std::ssize(contact.dofs);
-  MatrixXd P = MatrixXd::Zero(3 * k_all, n), B = P, FB = P, sB = P;
+  MatrixXd P = MatrixXd::Zero(3 * k_all, n), B = P, FB = P, s_B = P;
   const CoarseNodes& coarse = *parts_->nodes;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Index node = loaded_[static_cast<std::size_t>(k)];
@@ -254,10 +260,10 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
         });
     const Mat3 phi_x = cross_matrix(at.phi.segment<3>(3 * k)), s_x = cross_matrix(at.s.segment<3>(3 * k));
     FB.middleRows<3>(3 * k) = phi_x * B.middleRows<3>(3 * k);
-    sB.middleRows<3>(3 * k) = s_x * B.middleRows<3>(3 * k);
+    s_B.middleRows<3>(3 * k) = s_x * B.middleRows<3>(3 * k);
   }
-  const MatrixXd MFB = M_ * FB;
-  MatrixXd geometric = FB.transpose() * MFB;
+  const MatrixXd M_FB = M_ * FB;
+  MatrixXd geometric = FB.transpose() * M_FB;
   for (Eigen::Index k = 0; k < k_all; ++k) {
     const Vec3 s = at.s.segment<3>(3 * k), phi = at.phi.segment<3>(3 * k);
     const Mat3 middle = 0.5 * (s * phi.transpose() + phi * s.transpose()) - s.dot(phi) * Mat3::Identity();
@@ -269,7 +275,7 @@ MatrixXd TwoLevels::hessian(const Contact& contact, const Look& at, MatrixXd* J)
           geometric(i, j);
   }
   if (J != nullptr) {  // R^T J of the loaded nodes
-    *J = MFB - sB;
+    *J = M_FB - s_B;
     for (Eigen::Index k = 0; k < k_all; ++k)
       J->middleRows<3>(3 * k) += at.R[static_cast<std::size_t>(k)].transpose() * P.middleRows<3>(3 * k);
   }
@@ -316,6 +322,39 @@ void TwoLevels::set_loaded(std::span<const Index> nodes) {
   }
 }
 
+/// H with the stiffness of the groups that are held.
+MatrixXd TwoLevels::held(const Contact& contact, const Look& at, const MatrixXd& J) const {
+  MatrixXd A = H_;
+  if (loaded_.empty()) return A;
+  const MatrixXd AJ = at.V.transpose() * J;
+  const MatrixXd by_groups = AJ.transpose() * Eigen::LDLT<MatrixXd>(at.S).solve(AJ);
+  for (Eigen::Index i = 0; i < by_groups.rows(); ++i) {
+    for (Eigen::Index j = 0; j < by_groups.cols(); ++j)
+      A(contact.dofs[static_cast<std::size_t>(i)], contact.dofs[static_cast<std::size_t>(j)]) +=
+          by_groups(i, j);
+  }
+  return A;
+}
+
+/// Goes along a step, or a part of it, to where Phi is lower: `tried`.
+/// \returns false where there is no such place
+bool TwoLevels::go_down(const Contact& contact, const VectorXd& step, const Look& at, Look& tried) {
+  const double slope = at.gradient.dot(step);
+  double share = 1.0;
+  for (int k = 0; k < most_halvings; ++k, share *= 0.5) {
+    const VectorXd q = q_ + share * step;
+    tried.dE = VectorXd::Zero(q.size());
+    tried.E = parts_->body->energy(q, &tried.dE);
+    look(contact, q, tried);
+    if (tried.energy <= at.energy + 1e-4 * share * slope ||
+        (std::isfinite(tried.energy) && tried.gradient.norm() < 0.5 * at.gradient.norm())) {
+      q_ = q;
+      return true;
+    }
+  }
+  return false;
+}
+
 TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const double> f,
                                std::span<const double> u, double tolerance, int most_steps) {
   if (nodes.empty() && rests_) return {.converged = true};
@@ -333,17 +372,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
   for (;; ++report.steps) {
     renew_tangent(at.dE, most_lag);
     H_ = hessian(contact, at, &J);
-    MatrixXd A = H_;
-    if (!loaded_.empty()) {
-      const MatrixXd AJ = at.V.transpose() * J;
-      const MatrixXd held = AJ.transpose() * Eigen::LDLT<MatrixXd>(at.S).solve(AJ);
-      for (Eigen::Index i = 0; i < held.rows(); ++i) {
-        for (Eigen::Index j = 0; j < held.cols(); ++j)
-          A(contact.dofs[static_cast<std::size_t>(i)], contact.dofs[static_cast<std::size_t>(j)]) +=
-              held(i, j);
-      }
-    }
-    VectorXd step = positive_factor(A, parts_->K).solve(-at.gradient);
+    VectorXd step = positive_factor(held(contact, at, J), parts_->K).solve(-at.gradient);
     const double longest = step.cwiseAbs().maxCoeff(), most = most_of_cell * parts_->nodes->field.edge();
     if (longest > most) step *= most / longest;
     const double size = std::sqrt(std::max(step.dot(parts_->K * step), 0.0));
@@ -351,20 +380,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
     report.residual = size / std::max(largest_q_, smallest);
     report.converged = report.residual <= tolerance;
     if (report.residual <= rounding || report.steps == most_steps) break;
-    const double slope = at.gradient.dot(step);
-    double share = 1.0;
-    bool is_lower = false;
-    VectorXd q;
-    for (int k = 0; k < most_halvings && !is_lower; ++k, share *= is_lower ? 1.0 : 0.5) {
-      q = q_ + share * step;
-      tried.dE = VectorXd::Zero(q.size());
-      tried.E = parts_->body->energy(q, &tried.dE);
-      look(contact, q, tried);
-      is_lower = tried.energy <= at.energy + 1e-4 * share * slope ||
-                 (std::isfinite(tried.energy) && tried.gradient.norm() < 0.5 * at.gradient.norm());
-    }
-    if (!is_lower) break;
-    q_ = q;
+    if (!go_down(contact, step, at, tried)) break;
     std::swap(at, tried);
     if (report.converged) break;
   }
@@ -377,15 +393,20 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
   }
   find_remainder(at);
   find_displacement();
+  keep_columns(contact, at, J);
+  return report;
+}
+
+/// Keeps J of the loaded nodes, of which `J` has the dofs that move them, in their frames.
+void TwoLevels::keep_columns(const Contact& contact, const Look& at, const MatrixXd& J) {
   columns_.clear();
   for (Eigen::Index k = 0; k < std::ssize(loaded_); ++k) {
-    CoarseColumn& column =
-        columns_.emplace_back(loaded_[static_cast<std::size_t>(k)], MatrixXd::Zero(q_.size(), d));
+    CoarseColumn column{loaded_[static_cast<std::size_t>(k)], MatrixXd::Zero(q_.size(), dimension_)};
     const MatrixXd turned = at.R[static_cast<std::size_t>(k)] * J.middleRows<3>(3 * k);
     for (std::size_t i = 0; i < contact.dofs.size(); ++i)
-      column.J.row(contact.dofs[i]) = turned.col(static_cast<Eigen::Index>(i)).head(d).transpose();
+      column.J.row(contact.dofs[i]) = turned.col(static_cast<Eigen::Index>(i)).head(dimension_).transpose();
+    columns_.push_back(std::move(column));
   }
-  return report;
 }
 
 /// s of all stored nodes: (Xi - P K_c^-1 P^T) R^T f.
@@ -421,7 +442,7 @@ void TwoLevels::find_displacement() {
 
 TwoLevelState TwoLevels::state(std::vector<Index> near) {
   H_ -= tangent_;
-  renew_tangent(dE_, most_lag_of_W);
+  renew_tangent(dE_, most_lag_of_compliance);
   H_ += tangent_;
   return {.nodes = parts_->nodes,
           .turns = turns_,

@@ -67,6 +67,10 @@ class TwoLevels {
   void make_contact(std::span<const Index> nodes, std::span<const double> f, std::span<const double> u,
                     Contact& contact) const;
   void look(const Contact& contact, const Eigen::VectorXd& q, Look& at) const;
+  void add_moments(Look& at) const;
+  [[nodiscard]] Eigen::MatrixXd held(const Contact& contact, const Look& at, const Eigen::MatrixXd& J) const;
+  bool go_down(const Contact& contact, const Eigen::VectorXd& step, const Look& at, Look& tried);
+  void keep_columns(const Contact& contact, const Look& at, const Eigen::MatrixXd& J);
   [[nodiscard]] Eigen::MatrixXd hessian(const Contact& contact, const Look& at, Eigen::MatrixXd* J) const;
 
   const CoarseParts* parts_;

@@ -114,8 +114,8 @@ class TwoLevelGreens final : public GreensOnTop {
       const Vec3 force = vector_at(f, dimension(), static_cast<Index>(k));
       if (const Index p = prepared_of_[static_cast<std::size_t>(nodes[k])]; p >= 0 && are_few) {
         for (Eigen::Index axis = 0; axis < dimension(); ++axis) {
-          q_rest += force[axis] * by_rest_.col(dimension() * p + axis);
-          q += force[axis] * by_tangent_.col(dimension() * p + axis);
+          q_rest += force[axis] * by_rest_.col(Eigen::Index{dimension()} * p + axis);
+          q += force[axis] * by_tangent_.col(Eigen::Index{dimension()} * p + axis);
         }
         continue;
       }
