@@ -86,81 +86,26 @@ void CoarseField::drop_dependent(std::span<const Vec3> points) {
 
 namespace {
 
+/// A field of some numbers at each node, and its slopes.
+template <int numbers>
+struct Sums {
+  using Numbers = Eigen::Array<double, numbers, 1>;
+  Numbers value = Numbers::Zero(), by_x = value, by_y = value, by_z = value;
+};
+
 /// Polynomials of each axis in turn: a sum over nodes of one axis, of these sums over the next, and so on.
-template <int D>
-CoarseValue value_of(const Index* node, const CoarsePlace& at, const double* q) noexcept {
-  CoarseValue sum;
-  for (int c = 0; c < (D == 3 ? 3 : 1); ++c) {
-    Vec3 plane = Vec3::Zero(), along_x = Vec3::Zero(), along_y = Vec3::Zero();
+template <int numbers>
+Sums<numbers> sums_of(int planes, const Index* node, const CoarsePlace& at, const double* q) noexcept {
+  using Numbers = typename Sums<numbers>::Numbers;
+  Sums<numbers> sum;
+  for (int c = 0; c < planes; ++c) {
+    Numbers plane = Numbers::Zero(), along_x = plane, along_y = plane;
     for (int b = 0; b < 3; ++b) {
-      Vec3 line = Vec3::Zero(), slope = Vec3::Zero();
+      Numbers line = Numbers::Zero(), slope = line;
       for (int a = 0; a < 3; ++a) {
         const Index number = node[9 * c + 3 * b + a];
         if (number < 0) continue;
-        const double* q_node = q + std::ptrdiff_t{D} * number;
-        const double value_a = at.value[a].x(), slope_a = at.slope[a].x();
-        for (int axis = 0; axis < D; ++axis) {
-          line[axis] += value_a * q_node[axis];
-          slope[axis] += slope_a * q_node[axis];
-        }
-      }
-      plane += at.value[b].y() * line;
-      along_x += at.value[b].y() * slope;
-      along_y += at.slope[b].y() * line;
-    }
-    sum.u += at.value[c].z() * plane;
-    sum.gradient.col(0) += at.value[c].z() * along_x;
-    sum.gradient.col(1) += at.value[c].z() * along_y;
-    sum.gradient.col(2) += at.slope[c].z() * plane;
-  }
-  return sum;
-}
-
-template <int D>
-Vec3 displacement_of(const Index* node, const CoarsePlace& at, const double* q) noexcept {
-  Vec3 u = Vec3::Zero();
-  for (int c = 0; c < (D == 3 ? 3 : 1); ++c) {
-    Vec3 plane = Vec3::Zero();
-    for (int b = 0; b < 3; ++b) {
-      Vec3 line = Vec3::Zero();
-      for (int a = 0; a < 3; ++a) {
-        const Index number = node[9 * c + 3 * b + a];
-        if (number < 0) continue;
-        const double* const q_node = q + std::ptrdiff_t{D} * number;
-        for (int axis = 0; axis < D; ++axis) line[axis] += at.value[a].x() * q_node[axis];
-      }
-      plane += at.value[b].y() * line;
-    }
-    u += at.value[c].z() * plane;
-  }
-  return u;
-}
-
-}  // namespace
-
-CoarseValue CoarseField::value(const CoarsePlace& at, std::span<const double> q) const noexcept {
-  const Index* const node = nodes_of(at);
-  return dimension_ == 3 ? value_of<3>(node, at, q.data()) : value_of<2>(node, at, q.data());
-}
-
-Vec3 CoarseField::displacement(const CoarsePlace& at, std::span<const double> q) const noexcept {
-  const Index* const node = nodes_of(at);
-  return dimension_ == 3 ? displacement_of<3>(node, at, q.data()) : displacement_of<2>(node, at, q.data());
-}
-
-std::pair<CoarseValue, Vec3> CoarseField::both(const CoarsePlace& at,
-                                               std::span<const double> q_and_p) const noexcept {
-  using Lanes = Eigen::Array<double, 8, 1>;
-  const Index* const node = nodes_of(at);
-  Lanes u = Lanes::Zero(), by_x = u, by_y = u, by_z = u;
-  for (int c = 0; c < 3; ++c) {
-    Lanes plane = Lanes::Zero(), along_x = plane, along_y = plane;
-    for (int b = 0; b < 3; ++b) {
-      Lanes line = Lanes::Zero(), slope = line;
-      for (int a = 0; a < 3; ++a) {
-        const Index number = node[9 * c + 3 * b + a];
-        if (number < 0) continue;
-        const Eigen::Map<const Lanes> of_node(q_and_p.data() + std::ptrdiff_t{8} * number);
+        const Eigen::Map<const Numbers> of_node(q + std::ptrdiff_t{numbers} * number);
         line += at.value[a].x() * of_node;
         slope += at.slope[a].x() * of_node;
       }
@@ -168,16 +113,37 @@ std::pair<CoarseValue, Vec3> CoarseField::both(const CoarsePlace& at,
       along_x += at.value[b].y() * slope;
       along_y += at.slope[b].y() * line;
     }
-    u += at.value[c].z() * plane;
-    by_x += at.value[c].z() * along_x;
-    by_y += at.value[c].z() * along_y;
-    by_z += at.slope[c].z() * plane;
+    sum.value += at.value[c].z() * plane;
+    sum.by_x += at.value[c].z() * along_x;
+    sum.by_y += at.value[c].z() * along_y;
+    sum.by_z += at.slope[c].z() * plane;
   }
-  std::pair<CoarseValue, Vec3> values;
-  values.first.u = u.head<3>();
-  values.first.gradient << by_x.head<3>(), by_y.head<3>(), by_z.head<3>();
-  values.second = u.segment<3>(4);
-  return values;
+  return sum;
+}
+
+/// The first d numbers as a displacement.
+template <int d, int numbers>
+CoarseValue displacement_of(const Sums<numbers>& sum) noexcept {
+  CoarseValue at;
+  at.u.head<d>() = sum.value.template head<d>();
+  at.gradient.col(0).head<d>() = sum.by_x.template head<d>();
+  at.gradient.col(1).head<d>() = sum.by_y.template head<d>();
+  at.gradient.col(2).head<d>() = sum.by_z.template head<d>();
+  return at;
+}
+
+}  // namespace
+
+CoarseValue CoarseField::value(const CoarsePlace& at, std::span<const double> q) const noexcept {
+  const Index* const node = nodes_of(at);
+  return dimension_ == 3 ? displacement_of<3>(sums_of<3>(3, node, at, q.data()))
+                         : displacement_of<2>(sums_of<2>(1, node, at, q.data()));
+}
+
+std::pair<CoarseValue, Vec3> CoarseField::both(const CoarsePlace& at,
+                                               std::span<const double> q_and_p) const noexcept {
+  const Sums<8> sum = sums_of<8>(3, nodes_of(at), at, q_and_p.data());
+  return {displacement_of<3>(sum), sum.value.segment<3>(4)};
 }
 
 CoarsePlace CoarseField::place(const Vec3& x) const noexcept {

@@ -51,8 +51,6 @@ class CoarseField {
 
   /// P q and its gradient.
   [[nodiscard]] CoarseValue value(const CoarsePlace& at, std::span<const double> q) const noexcept;
-  /// P q [m].
-  [[nodiscard]] Vec3 displacement(const CoarsePlace& at, std::span<const double> q) const noexcept;
   /// P q and its gradient, and P p, of fields in space side by side: [q_x q_y q_z 0 p_x p_y p_z 0] of each
   /// node.
   [[nodiscard]] std::pair<CoarseValue, Vec3> both(const CoarsePlace& at,

@@ -234,7 +234,7 @@ class TwoLevelGreens final : public GreensOnTop {
 
   /// R P q of a node.
   [[nodiscard]] Vec3 at_rest(Index stored, std::span<const double> q) const noexcept {
-    const Vec3 u = state_.nodes->field.displacement(state_.nodes->place[static_cast<std::size_t>(stored)], q);
+    const Vec3 u = state_.nodes->field.value(state_.nodes->place[static_cast<std::size_t>(stored)], q).u;
     return state_.turns[static_cast<std::size_t>(stored)].R * free_part(stored, u);
   }
 
