@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <ranges>
 
 #include "base/error.h"
 #include "precompute/compression/out_of_reach.h"
@@ -24,8 +25,10 @@ constexpr std::int64_t touch_matrices = 2;        // per thread for a touch: its
 constexpr double touch_steps = 4.0;               // of conjugate gradients (measured)
 constexpr double typical_rank = 45.0;             // for the default tolerance (measured)
 constexpr std::int64_t recompression_copies = 6;  // of the far part: skeletons are larger (measured)
-constexpr double far_share = 1.8;                 // of the time of near pairs (measured)
-constexpr double touch_share = 2.5;               // relative to the time of equally many columns of near
+constexpr std::int64_t forward_copies = 3;        // of the far part, for forward solutions (measured)
+constexpr double near_efficiency = 1.45;          // of near pairs beside columns (measured)
+constexpr double far_share = 1.2;                 // of the time of near pairs (measured)
+constexpr double touch_share = 4.5;               // relative to the time of equally many columns of near
                                                   // pairs (measured)
 
 constexpr const char* near_stage = "near pairs";
@@ -49,6 +52,10 @@ StoredNumbering reordered(const StoredNumbering& stored, const std::vector<Index
     for (std::size_t axis = 0; axis < d; ++axis) result.dofs.push_back(stored.dofs[d * node + axis]);
   }
   return result;
+}
+
+auto leaves_of(const Tile& tile) {
+  return std::views::iota(static_cast<Index>(tile.first), static_cast<Index>(tile.first + tile.count));
 }
 
 std::vector<double> table_of(const std::vector<TouchErrors>& errors) {
@@ -88,6 +95,7 @@ class GreensCompressor {
         writer_(writer),
         sharing_(run.team, run.jobs, run.interrupted),
         compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, sharing_,
+                     forward_copies * plan.far_bytes,
                      [this](CompressionStage stage, double share) { return reach(name_of(stage), share); }) {}
 
   /// Solves for the near pairs of the leaves of `part` that the file does not have. False when interrupted.
@@ -96,11 +104,17 @@ class GreensCompressor {
     stage_ = near_stage;
     return solve_pieces(run_, near_tiles(plan_.frame), part,
                         {near_stage, "those of ", "leaves", plan_.near_seconds,
-                         [&](const Tile& tile) { return writer_.has_near(static_cast<Index>(tile.first)); },
+                         [&](const Tile& tile) {
+                           const auto leaves = leaves_of(tile);
+                           return std::all_of(leaves.begin(), leaves.end(),
+                                              [&](Index leaf) { return writer_.has_near(leaf); });
+                         },
                          [&](const Tile& tile, int worker) {
                            std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
-                           compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
-                           writer_.write_near(static_cast<Index>(tile.first), entries);
+                           for (const Index leaf : leaves_of(tile)) {
+                             compression_.solve_near(leaf, worker, entries);
+                             writer_.write_near(leaf, entries);
+                           }
                          }});
   }
 
@@ -211,7 +225,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
                       thread_bytes(jobs) + plan.frame.bytes() + recompression_copies * plan.far_bytes +
                       static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);
   const double seconds_per_flop = dense.flops > 0.0 ? dense.seconds / dense.flops : 0.0;
-  plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame);
+  plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame) / near_efficiency;
   plan.sample_seconds = seconds_per_flop * random_loads * 4.0 * static_cast<double>(factor.entries());
   plan.far_seconds = far_share * plan.near_seconds;
   const auto touch_columns =
@@ -229,10 +243,11 @@ std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks) {
 
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {
   std::vector<Tile> tiles;
-  for (Index leaf = 0; leaf < frame.tree.leaves(); ++leaf) {
+  const Index together = clusters_together(frame.tree.levels);
+  for (Index leaf = 0; leaf < frame.tree.leaves(); leaf += together) {
     const auto begin = static_cast<std::size_t>(frame.first_near_pair(leaf)),
-               end = static_cast<std::size_t>(frame.first_near_pair(leaf + 1));
-    tiles.push_back({leaf, 1, static_cast<double>(frame.near_at[end] - frame.near_at[begin])});
+               end = static_cast<std::size_t>(frame.first_near_pair(leaf + together));
+    tiles.push_back({leaf, together, static_cast<double>(frame.near_at[end] - frame.near_at[begin])});
   }
   return tiles;
 }

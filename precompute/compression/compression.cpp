@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "matrices/hierarchical_product.h"
 #include "precompute/compression/float_entries.h"
 #include "precompute/compression/recompression.h"
 
@@ -21,18 +20,78 @@ constexpr double skeleton_share = 0.2;      // of the cut: skeletons must not ad
 constexpr Index leaves_estimated = 64;      // to estimate flops
 constexpr std::int64_t loads_at_once = 32;  // solved together
 constexpr Index checks = 32;                // more loads, to measure the error of the pairs
+constexpr double near_work = 1.6;           // of forward solutions: some are made twice, and multiplied
+constexpr std::int64_t near_forward = 2;    // forward solutions, while random loads do not need memory yet
 constexpr double single_share = 0.3;        // of the skeletons' cut, that single precision may add
+
+/// Xi f for loads f [order x loads]: up the tree, across the far pairs, down the tree, and the near pairs.
+DoubleRows product(const HierarchicalMatrix& matrix, const DoubleRows& f, int jobs) {
+  const ClusterTree& tree = matrix.tree;
+  std::vector<DoubleRows> strength(at(tree.clusters())), terms(at(tree.clusters()));
+  DoubleRows u(f.rows(), f.cols());
+  const auto rows_of = [&](Index leaf) { return end_dof(matrix, leaf) - first_dof(matrix, leaf); };
+  const auto V = [&](Index leaf) {
+    const float* entries = matrix.basis.get() + matrix.basis_at[at(leaf - tree.first_leaf())];
+    return Eigen::Map<const FloatRows>(entries, rows_of(leaf), matrix.rank[at(leaf)]).cast<double>();
+  };
+  const auto E = [&](Index c) {
+    const float* entries = matrix.transfer.get() + matrix.transfer_at[at(c)];
+    return Eigen::Map<const FloatRows>(entries, matrix.rank[at(c)], matrix.rank[at(ClusterTree::parent(c))])
+        .cast<double>();
+  };
+  const auto for_level = [&](int level, const auto& work) {
+    const Index first = tree.first_of_level(level);
+    parallel_for(Index{1} << level, jobs, [&](std::int64_t k, int) { work(first + static_cast<Index>(k)); });
+  };
+  for_level(tree.levels, [&](Index leaf) {
+    strength[at(leaf)] = V(leaf).transpose() * f.middleRows(first_dof(matrix, leaf), rows_of(leaf));
+  });
+  for (int level = tree.levels - 1; level > 0; --level)
+    for_level(level, [&](Index c) {
+      strength[at(c)] = E(2 * c + 1).transpose() * strength[at(2 * c + 1)] +
+                        E(2 * c + 2).transpose() * strength[at(2 * c + 2)];
+    });
+  for (int level = 0; level <= tree.levels; ++level)
+    for_level(level, [&](Index c) {
+      terms[at(c)] = DoubleRows::Zero(matrix.rank[at(c)], f.cols());
+      if (c > 0) terms[at(c)] += E(c) * terms[at(ClusterTree::parent(c))];
+      for (const auto& [other, pair] : partners(matrix, c)) {
+        const float* entries = matrix.coupling.get() + matrix.coupling_at[at(pair)];
+        const Index own = matrix.rank[at(c)], others = matrix.rank[at(other)];
+        if (c > other) {
+          terms[at(c)] +=
+              Eigen::Map<const FloatRows>(entries, own, others).cast<double>() * strength[at(other)];
+        } else {
+          terms[at(c)] += Eigen::Map<const FloatRows>(entries, others, own).cast<double>().transpose() *
+                          strength[at(other)];
+        }
+      }
+    });
+  for_level(tree.levels, [&](Index leaf) {
+    u.middleRows(first_dof(matrix, leaf), rows_of(leaf)) =
+        near_displacement(matrix, leaf, f) + V(leaf) * terms[at(leaf)];
+  });
+  return u;
+}
 
 }  // namespace
 
 Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-                         const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress)
+                         const ClusteredNodes& nodes, Sharing& sharing, std::int64_t forward_bytes,
+                         CompressionProgress progress)
     : solver_(factor, sharing.jobs()),
       stored_dofs_(stored_dofs),
       sharing_(sharing),
       progress_(std::move(progress)),
       matrix_(compression_frame(nodes, dimension)),
-      workspaces_(at(sharing.jobs())) {}
+      forward_bytes_(forward_bytes),
+      near_solver_(std::make_unique<BlockSolver<double>>(
+          solver_, matrix_.tree, matrix_.tree.levels, sharing.jobs(), near_forward * forward_bytes,
+          [this](Index leaf) {
+            const auto dofs = stored_dofs_.subspan(at(first_dof(matrix_, leaf)),
+                                                   at(end_dof(matrix_, leaf) - first_dof(matrix_, leaf)));
+            return Dofs(dofs.begin(), dofs.end());
+          })) {}
 
 /// First entry of the near pairs of a leaf [0, leaves); the entries of the next leaf follow.
 std::int64_t Compression::near_begin(Index leaf) const {
@@ -41,7 +100,7 @@ std::int64_t Compression::near_begin(Index leaf) const {
 
 void Compression::solve_near(Index leaf, int worker, std::vector<float>& entries) {
   entries.resize(at(near_begin(leaf + 1) - near_begin(leaf)));
-  solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
+  solve_near_of(matrix_.tree.first_leaf() + leaf, worker, entries);
 }
 
 bool Compression::gather_near(const FetchNear& fetch) {
@@ -57,8 +116,7 @@ bool Compression::gather_near(const FetchNear& fetch) {
     if (fetch) {
       fetch(static_cast<Index>(leaf), entries_of(leaf));
     } else {
-      solve_near_of(matrix_.tree.first_leaf() + static_cast<Index>(leaf), entries_of(leaf),
-                    workspaces_[at(worker)]);
+      solve_near_of(matrix_.tree.first_leaf() + static_cast<Index>(leaf), worker, entries_of(leaf));
     }
   };
   leaves.carry = [&](std::int64_t leaf, Parcel& results) { results.carry(entries_of(leaf)); };
@@ -71,16 +129,13 @@ bool Compression::gather_near(const FetchNear& fetch) {
 }
 
 /// Solves for the pairs with the leaf as column.
-void Compression::solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace) {
+void Compression::solve_near_of(Index leaf, int worker, std::span<float> entries) {
   const std::int64_t width = end_dof(matrix_, leaf) - first_dof(matrix_, leaf);
-  Dofs rows;
-  for (const auto& [row, pair] : neighbours(matrix_, leaf)) {
-    if (row < leaf) continue;
-    for (std::int64_t dof = first_dof(matrix_, row); dof < end_dof(matrix_, row); ++dof)
-      rows.push_back(stored_dofs_[at(dof)]);
-  }
-  std::vector<double> block(rows.size() * at(width));
-  solver_.solve(rows, stored_dofs_.subspan(at(first_dof(matrix_, leaf)), at(width)), workspace, block);
+  std::vector<Index> rows;
+  for (const auto& [row, pair] : neighbours(matrix_, leaf))
+    if (row >= leaf) rows.push_back(row);
+  std::vector<double> block(entries.size());
+  near_solver_->solve(rows, leaf, worker, block);
   std::transform(block.begin(), block.end(), entries.begin(),
                  [](double value) { return static_cast<float>(value); });
   for (std::int64_t i = 0; i < width; ++i)  // the leaf with itself comes first
@@ -92,12 +147,12 @@ bool Compression::sample() {
   const std::int64_t n = matrix_.order(), m = random_loads + checks;
   load_.resize(n, m);
   response_.resize(n, m);
-  std::mt19937_64 random(20261125);
-  for (std::int64_t i = 0; i < n; ++i)
-    for (std::int64_t k = 0; k < m; ++k)
-      load_(i, k) = root_[i] > 0.0 ? ((random() >> 63) != 0 ? 1.0 : -1.0) : 0.0;
   parallel_for(matrix_.tree.leaves(), sharing_.jobs(), [&](std::int64_t leaf, int) {
     const Index c = matrix_.tree.first_leaf() + static_cast<Index>(leaf);
+    std::mt19937_64 random(20261125 + static_cast<std::uint64_t>(leaf));
+    for (std::int64_t i = first_dof(matrix_, c); i < end_dof(matrix_, c); ++i)
+      for (std::int64_t k = 0; k < m; ++k)
+        load_(i, k) = root_[i] > 0.0 ? ((random() >> 63) != 0 ? 1.0 : -1.0) : 0.0;
     auto of_leaf = load_.middleRows(first_dof(matrix_, c), end_dof(matrix_, c) - first_dof(matrix_, c));
     const Eigen::MatrixXd L = root_of_leaf(matrix_, static_cast<Index>(leaf));
     L.transpose().triangularView<Eigen::Upper>().solveInPlace(of_leaf);
@@ -105,12 +160,13 @@ bool Compression::sample() {
   const auto of_block = [&](std::int64_t block) {
     return response_.middleCols(block * loads_at_once, loads_at_once);
   };
+  std::vector<SelectedSolver::Workspace> workspaces(at(sharing_.jobs()));
   SharedItems blocks;
   blocks.count = m / loads_at_once;
   blocks.work = [&](std::int64_t block, int worker) {
     const DoubleRows f = load_.middleCols(block * loads_at_once, loads_at_once);
     DoubleRows u(n, loads_at_once);
-    solver_.multiply(stored_dofs_, loads_at_once, {f.data(), at(f.size())}, workspaces_[at(worker)],
+    solver_.multiply(stored_dofs_, loads_at_once, {f.data(), at(f.size())}, workspaces[at(worker)],
                      {u.data(), at(u.size())});
     of_block(block) = u;
   };
@@ -160,41 +216,28 @@ bool Compression::try_single() {
 
 bool Compression::prepare(const FetchNear& fetch) {
   const bool whole = gather_near(fetch) && sample() && try_single();
-  workspaces_ = {};  // what follows has its own
+  near_solver_.reset();  // frees its memory
   return whole;
 }
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
   const double cut_of_skeletons = skeleton_share * cut;
   const bool single = single_error_ <= single_share * cut_of_skeletons;
-  std::optional<HierarchicalMatrix> matrix =
-      with_far_pairs({solver_, single, stored_dofs_, matrix_, root_, load_, response_}, cut_of_skeletons,
-                     sharing_, [&](double share) { return progress_(CompressionStage::far, share); });
+  std::optional<HierarchicalMatrix> matrix = with_far_pairs(
+      {solver_, single, forward_bytes_, stored_dofs_, matrix_, root_, load_, response_}, cut_of_skeletons,
+      sharing_, [&](double share) { return progress_(CompressionStage::far, share); });
   if (matrix) matrix = recompressed(*std::move(matrix), cut, sharing_);
-  if (!matrix || !check(*matrix)) return nullptr;
+  if (!matrix) return nullptr;
+  check(*matrix);
   return std::make_shared<HierarchicalMatrix>(*std::move(matrix));
 }
 
 /// Adds the errors of the skeletons to pair_error: the error that loads not used for choosing show beyond
 /// pair_error is distributed in proportion to the pairs' couplings, since their bases are orthonormal in the
 /// norms of L.
-bool Compression::check(HierarchicalMatrix& matrix) {
-  std::vector<Index> nodes(at(matrix.tree.nodes));
-  std::iota(nodes.begin(), nodes.end(), 0);
-  const NodeRange all{0, matrix.tree.nodes};
-  std::vector<Eigen::VectorXd> displaced(checks);
-  SharedItems loads;
-  loads.count = checks;
-  loads.work = [&](std::int64_t k, int) {
-    const Eigen::VectorXd f = load_.col(random_loads + k);
-    Eigen::VectorXd& u = displaced[at(k)];
-    u.resize(f.size());
-    displace(matrix, nodes, {f.data(), at(f.size())}, {&all, 1}, {u.data(), at(u.size())});
-  };
-  loads.carry = [&](std::int64_t k, Parcel& results) { results.carry(displaced[at(k)]); };
-  if (!sharing_.for_each(loads)) return false;
-  DoubleRows missing(matrix.order(), checks);
-  for (Index k = 0; k < checks; ++k) missing.col(k) = response_.col(random_loads + k) - displaced[at(k)];
+void Compression::check(HierarchicalMatrix& matrix) const {
+  DoubleRows missing =
+      response_.rightCols(checks) - product(matrix, load_.rightCols(checks), sharing_.jobs());
   const double measured = weighed_rows(std::move(missing)).squaredNorm();
   std::vector<double> of_pair(matrix.pair_error.size());
   for (std::size_t p = 0; p < of_pair.size(); ++p) {
@@ -208,7 +251,6 @@ bool Compression::check(HierarchicalMatrix& matrix) {
   const double share = whole > 0.0 ? std::max(0.5 * measured - known, 0.0) / whole : 0.0;
   for (std::size_t p = 0; p < of_pair.size(); ++p)
     matrix.pair_error[p] = std::hypot(matrix.pair_error[p], std::sqrt(share * of_pair[p]));
-  return true;
 }
 
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {
@@ -226,28 +268,19 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
                   const HierarchicalMatrix& frame) {
   const SelectedSolver solver(factor);
   const ClusterTree& tree = frame.tree;
-  const auto dofs_of = [&](Index c) {
-    return stored_dofs.subspan(at(first_dof(frame, c)), at(end_dof(frame, c) - first_dof(frame, c)));
-  };
   const Index step = std::max<Index>(1, tree.leaves() / leaves_estimated);
   double flops = 0.0;
   Index counted = 0;
-  for (Index leaf = 0; leaf < tree.leaves(); leaf += step, ++counted) {
-    Dofs rows;
-    for (std::int64_t p = frame.first_near_pair(leaf); p < frame.first_near_pair(leaf + 1); ++p) {
-      const auto more = dofs_of(frame.near_pair[at(p)][0]);
-      rows.insert(rows.end(), more.begin(), more.end());
-    }
-    flops += solver.flops(rows, dofs_of(tree.first_leaf() + leaf));
-  }
-  return flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
+  for (Index c = tree.first_leaf(); c < tree.clusters(); c += step, ++counted)
+    flops += solver.forward_flops(
+        stored_dofs.subspan(at(first_dof(frame, c)), at(end_dof(frame, c) - first_dof(frame, c))));
+  return near_work * flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
 }
 
 std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
   const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
-  constexpr std::int64_t columns = columns_at_once<double>;
-  return SelectedSolver(factor).workspace_bytes(std::max(frame.dimension * leaf, columns)) +
-         frame.order() * columns * std::int64_t{sizeof(double)};
+  // Random loads and their responses, or else a forward solution of a group: as large as of one on all rows.
+  return 2 * SelectedSolver(factor).workspace_bytes(std::max(frame.dimension * leaf, loads_at_once));
 }
 
 std::int64_t solver_bytes(const Factor& factor) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "matrices/hierarchical.h"
+#include "precompute/compression/block_solver.h"
 #include "precompute/compression/cluster_pairs.h"
 #include "precompute/compression/far_pairs.h"
 #include "precompute/compression/selected_solver.h"
@@ -38,10 +39,11 @@ using FetchNear = std::function<void(Index leaf, std::span<float> entries)>;
 /// result does not depend on how the work is divided.
 class Compression {
  public:
-  /// `stored_dofs` [d N] are dofs of K, d per node, in the order of `nodes`, -1 if held. Keeps references to
-  /// all arguments.
+  /// `stored_dofs` [d N] are dofs of K, d per node, in the order of `nodes`, -1 if held. `forward_bytes`:
+  /// memory for forward solutions. Keeps references to all arguments.
   Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-              const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress);
+              const ClusteredNodes& nodes, Sharing& sharing, std::int64_t forward_bytes,
+              CompressionProgress progress);
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;
 
@@ -61,11 +63,11 @@ class Compression {
 
  private:
   [[nodiscard]] std::int64_t near_begin(Index leaf) const;
-  void solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace);
+  void solve_near_of(Index leaf, int worker, std::span<float> entries);
   bool gather_near(const FetchNear& fetch);
   bool sample();
   bool try_single();
-  bool check(HierarchicalMatrix& matrix);
+  void check(HierarchicalMatrix& matrix) const;
   [[nodiscard]] Eigen::VectorXd weighed_rows(DoubleRows u) const;
 
   SelectedSolver solver_;
@@ -76,7 +78,8 @@ class Compression {
   Eigen::VectorXd root_;                                           // [order] root of D, 0 where held
   DoubleRows response_, load_;                                     // [order x (random_loads + checks)]
   double single_error_ = std::numeric_limits<double>::infinity();  // [-] of a leaf, root mean square
-  std::vector<SelectedSolver::Workspace> workspaces_;
+  std::int64_t forward_bytes_;
+  std::unique_ptr<BlockSolver<double>> near_solver_;
 };
 
 /// Tree and pairs of a matrix that is yet to be computed.

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "precompute/compression/block_solver.h"
 #include "precompute/compression/float_entries.h"
 #include "precompute/compression/out_of_reach.h"
 #include "precompute/compression/recompression.h"
@@ -85,18 +85,6 @@ class FarPairs {
     Eigen::MatrixXd V;  ///< V of a leaf; of other clusters E of both children, one below the other
   };
 
-  /// A solver, and the scratch of each thread.
-  template <class Real>
-  struct Solves {
-    const SelectedSolverOf<Real>& solver;
-    std::vector<typename SelectedSolverOf<Real>::Workspace> workspaces;
-  };
-
-  std::span<const HierarchicalMatrix::Pair> partners(Index c) const {
-    return std::span(frame_.partner)
-        .subspan(at(frame_.partner_from[at(c)]),
-                 at(frame_.partner_from[at(c) + 1] - frame_.partner_from[at(c)]));
-  }
   /// Dofs of K for stored dofs.
   Dofs dofs_of(const Dofs& stored) const {
     Dofs dofs;
@@ -108,13 +96,13 @@ class FarPairs {
   Front joined_front(Index c);
   void thin_out(Index c, double cut, Front& front) const;
   void check_rank(Index c) const;
-  std::vector<Index> groups_of(Index first, Index clusters, std::size_t most) const;
   std::vector<Index> needed_of_level(int level) const;
   bool make_fronts(int level, double cut, const std::function<bool(double)>& done);
   template <class Real>
-  bool make_couplings(int level, Solves<Real>& solves, const std::function<bool(double)>& done);
+  bool make_couplings(int level, const SelectedSolverOf<Real>& solver,
+                      const std::function<bool(double)>& done);
   template <class Real>
-  void couple(Index first, Index end, int worker, Solves<Real>& solves);
+  void couple(Index c, int worker, BlockSolver<Real>& blocks);
   void take_off(Index c);
 
   const FarSource& source_;
@@ -130,20 +118,9 @@ FarPairs::Front FarPairs::leaf_front(Index leaf) const {
   Front front;
   const std::int64_t first = first_dof(frame_, leaf), n = end_dof(frame_, leaf) - first;
   for (std::int64_t i = 0; i < n; ++i) front.skeleton.push_back(first + i);
-  front.response = source_.response.block(first, 0, n, samples);
   front.load = source_.load.block(first, 0, n, samples);
-  for (const auto& [other, pair] : neighbours(frame_, leaf)) {
-    const std::int64_t width = end_dof(frame_, other) - first_dof(frame_, other);
-    const float* near = frame_.near.get() + frame_.near_at[at(pair)];
-    const auto loads = source_.load.block(first_dof(frame_, other), 0, width, samples);
-    if (leaf >= other) {
-      const FloatRows block = Eigen::Map<const FloatRows>(near, n, width);
-      front.response.noalias() -= block.cast<double>() * loads;
-    } else {
-      const FloatRows block = Eigen::Map<const FloatRows>(near, width, n);
-      front.response.noalias() -= block.cast<double>().transpose() * loads;
-    }
-  }
+  front.response = source_.response.block(first, 0, n, samples) -
+                   near_displacement(frame_, leaf, source_.load).leftCols(samples);
   for (std::int64_t i = 0; i < n; ++i)
     front.response.row(i) *= source_.root[first + i] > 0.0 ? 1.0 / source_.root[first + i] : 0.0;
   front.W = root_of_leaf(frame_, leaf - frame_.tree.first_leaf())
@@ -204,48 +181,25 @@ std::vector<Index> FarPairs::needed_of_level(int level) const {
   return clusters;
 }
 
-/// Starts of the groups of clusters of a level that are solved together, with at most so many columns or
-/// those of one cluster, and the end of the last one.
-std::vector<Index> FarPairs::groups_of(Index first, Index clusters, std::size_t most) const {
-  std::vector<Index> starts = {first};
-  std::size_t columns = 0;
-  for (Index c = first; c < first + clusters; ++c) {
-    columns += fronts_[at(c)].skeleton.size();
-    if (columns <= most || c == starts.back()) continue;
-    starts.push_back(c);
-    columns = fronts_[at(c)].skeleton.size();
-  }
-  starts.push_back(first + clusters);
-  return starts;
-}
-
-/// Computes the couplings of the far pairs with the clusters [first, end) as columns: adjacent in the body,
-/// they have most of a solve in common.
+/// Computes the couplings of the far pairs with the cluster as column.
 template <class Real>
-void FarPairs::couple(Index first, Index end, int worker, Solves<Real>& solves) {
-  Dofs columns, rows;
-  std::map<Index, std::int64_t> row_of;  // first row of a cluster's skeleton
-  for (Index c = first; c < end; ++c) {
-    const Dofs& skeleton = fronts_[at(c)].skeleton;
-    columns.insert(columns.end(), skeleton.begin(), skeleton.end());
-    for (const auto& [row, pair] : partners(c)) {
-      if (row < c || !row_of.emplace(row, std::ssize(rows)).second) continue;
-      rows.insert(rows.end(), fronts_[at(row)].skeleton.begin(), fronts_[at(row)].skeleton.end());
-    }
+void FarPairs::couple(Index c, int worker, BlockSolver<Real>& blocks) {
+  std::vector<Index> rows;
+  Eigen::Index height = 0;
+  for (const auto& [row, pair] : partners(frame_, c)) {
+    if (row < c) continue;
+    rows.push_back(row);
+    height += std::ssize(fronts_[at(row)].skeleton);
   }
-  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(std::ssize(rows),
-                                                                             std::ssize(columns));
-  solves.solver.solve(dofs_of(rows), dofs_of(columns), solves.workspaces[at(worker)],
-                      {block.data(), at(block.size())});
-  std::int64_t column = 0;
-  for (Index c = first; c < end; ++c) {
-    const auto width = std::ssize(fronts_[at(c)].skeleton);
-    for (const auto& [row, pair] : partners(c)) {
-      if (row > c)
-        coupling_[at(pair)] = block.block(row_of[row], column, std::ssize(fronts_[at(row)].skeleton), width)
-                                  .template cast<float>();
-    }
-    column += width;
+  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(
+      height, std::ssize(fronts_[at(c)].skeleton));
+  blocks.solve(rows, c, worker, {block.data(), at(block.size())});
+  Eigen::Index first = 0;
+  for (const auto& [row, pair] : partners(frame_, c)) {
+    if (row < c) continue;
+    const auto count = std::ssize(fronts_[at(row)].skeleton);
+    coupling_[at(pair)] = block.middleRows(first, count).template cast<float>();
+    first += count;
   }
 }
 
@@ -253,7 +207,7 @@ void FarPairs::couple(Index first, Index end, int worker, Solves<Real>& solves) 
 void FarPairs::take_off(Index c) {
   Front& front = fronts_[at(c)];
   DoubleRows by_partners = DoubleRows::Zero(front.response.rows(), front.response.cols());
-  for (const auto& [other, pair] : partners(c)) {
+  for (const auto& [other, pair] : partners(frame_, c)) {
     const DoubleRows S = coupling_[at(pair)].cast<double>();
     if (c > other) {
       by_partners.noalias() += S * fronts_[at(other)].load;
@@ -301,18 +255,24 @@ void FarPairs::check_rank(Index c) const {
 
 /// Computes the couplings of the far pairs of a level.
 template <class Real>
-bool FarPairs::make_couplings(int level, Solves<Real>& solves, const std::function<bool(double)>& done) {
-  const std::vector<Index> starts =
-      groups_of(frame_.tree.first_of_level(level), Index{1} << level, columns_at_once<Real>);
+bool FarPairs::make_couplings(int level, const SelectedSolverOf<Real>& solver,
+                              const std::function<bool(double)>& done) {
+  BlockSolver<Real> blocks(solver, frame_.tree, level, sharing_.jobs(), source_.forward_bytes,
+                           [this](Index c) { return dofs_of(fronts_[at(c)].skeleton); });
   SharedItems groups;
-  groups.count = std::ssize(starts) - 1;
+  const Index first = frame_.tree.first_of_level(level), together = clusters_together(level);
+  groups.count = (Index{1} << level) / together;
+  const auto for_clusters = [&](std::int64_t group, const auto& use) {
+    for (Index k = 0; k < together; ++k) use(first + static_cast<Index>(group) * together + k);
+  };
   groups.work = [&](std::int64_t group, int worker) {
-    couple(starts[at(group)], starts[at(group + 1)], worker, solves);
+    for_clusters(group, [&](Index c) { couple(c, worker, blocks); });
   };
   groups.carry = [&](std::int64_t group, Parcel& results) {
-    for (Index c = starts[at(group)]; c < starts[at(group + 1)]; ++c)
-      for (const auto& [row, pair] : partners(c))
+    for_clusters(group, [&](Index c) {
+      for (const auto& [row, pair] : partners(frame_, c))
         if (row > c) results.carry(coupling_[at(pair)]);
+    });
   };
   groups.done = done;
   return sharing_.for_each(groups);
@@ -321,15 +281,13 @@ bool FarPairs::make_couplings(int level, Solves<Real>& solves, const std::functi
 template <class Real>
 bool FarPairs::climb(const SelectedSolverOf<Real>& solver, double cut,
                      const std::function<bool(double)>& done) {
-  Solves<Real> solves{solver, {}};
-  solves.workspaces.resize(at(sharing_.jobs()));
   const ClusterTree& tree = frame_.tree;
   fronts_.assign(at(tree.clusters()), {});
   coupling_.assign(frame_.far_pair.size(), {});
   needed_.assign(at(tree.clusters()), false);
   std::int64_t count = 0;
   for (Index c = 1; c < tree.clusters(); ++c) {
-    needed_[at(c)] = needed_[at(ClusterTree::parent(c))] || !partners(c).empty();
+    needed_[at(c)] = needed_[at(ClusterTree::parent(c))] || !partners(frame_, c).empty();
     count += needed_[at(c)] ? 1 : 0;
   }
   std::int64_t begun = 0;  // clusters
@@ -343,7 +301,7 @@ bool FarPairs::climb(const SelectedSolverOf<Real>& solver, double cut,
       return [&, from, to](double part) { return done(std::lerp(share(from), share(to), part)); };
     };
     if (!make_fronts(level, cut, told(0.0, front_share)) ||
-        !make_couplings(level, solves, told(front_share, 1.0)))
+        !make_couplings(level, solver, told(front_share, 1.0)))
       return false;
     begun += clusters;
     if (level == tree.levels) continue;
@@ -393,6 +351,28 @@ std::span<const HierarchicalMatrix::Pair> neighbours(const HierarchicalMatrix& m
   const std::size_t i = at(leaf - matrix.tree.first_leaf());
   return std::span(matrix.neighbour)
       .subspan(at(matrix.near_from[i]), at(matrix.near_from[i + 1] - matrix.near_from[i]));
+}
+
+std::span<const HierarchicalMatrix::Pair> partners(const HierarchicalMatrix& matrix, Index c) {
+  return std::span(matrix.partner)
+      .subspan(at(matrix.partner_from[at(c)]),
+               at(matrix.partner_from[at(c) + 1] - matrix.partner_from[at(c)]));
+}
+
+DoubleRows near_displacement(const HierarchicalMatrix& matrix, Index leaf, const DoubleRows& loads) {
+  const std::int64_t n = end_dof(matrix, leaf) - first_dof(matrix, leaf);
+  DoubleRows u = DoubleRows::Zero(n, loads.cols());
+  for (const auto& [other, pair] : neighbours(matrix, leaf)) {
+    const std::int64_t width = end_dof(matrix, other) - first_dof(matrix, other);
+    const float* near = matrix.near.get() + matrix.near_at[at(pair)];
+    const auto f = loads.middleRows(first_dof(matrix, other), width);
+    if (leaf >= other) {
+      u.noalias() += Eigen::Map<const FloatRows>(near, n, width).cast<double>() * f;
+    } else {
+      u.noalias() += Eigen::Map<const FloatRows>(near, width, n).cast<double>().transpose() * f;
+    }
+  }
+  return u;
 }
 
 std::optional<HierarchicalMatrix> with_far_pairs(const FarSource& source, double cut, Sharing& sharing,

@@ -26,17 +26,20 @@ inline std::int64_t end_dof(const HierarchicalMatrix& matrix, Index cluster) noe
 /// Leaves, as clusters, that are near a leaf, and the numbers of the pairs.
 std::span<const HierarchicalMatrix::Pair> neighbours(const HierarchicalMatrix& matrix, Index leaf);
 
+/// Far partners of a cluster, and the numbers of the pairs.
+std::span<const HierarchicalMatrix::Pair> partners(const HierarchicalMatrix& matrix, Index c);
+
+/// Displacements of a leaf by loads [dofs x loads] on it and on the leaves near it.
+DoubleRows near_displacement(const HierarchicalMatrix& matrix, Index leaf, const DoubleRows& loads);
+
 /// Number of random loads, which act on the whole body.
 inline constexpr Index random_loads = 256;
-
-/// Columns of couplings that are solved together, or those of one cluster; as much memory in both precisions.
-template <class Real>
-inline constexpr std::size_t columns_at_once = 800 / sizeof(Real);
 
 /// Data from which far pairs are found.
 struct FarSource {
   const SelectedSolver& solver;
   bool single;                                ///< couplings are solved for in single precision
+  std::int64_t forward_bytes;                 ///< memory for forward solutions
   std::span<const std::int64_t> stored_dofs;  ///< [d N] of K, -1 where held
   const HierarchicalMatrix& frame;            ///< tree and pairs, with the near ones
   const Eigen::VectorXd& root;                ///< [d N] of the diagonal, 0 where held

@@ -1,12 +1,51 @@
 #include "precompute/compression/selected_solver.h"
 
 #include <algorithm>
+#include <bit>
 #include <functional>
 #include <type_traits>
 
 #include "precompute/numerics/spread_numbers.h"
 
 namespace palpate {
+namespace {
+
+/// C += A^T B, A [k x m], B [k x n], all row-major.
+void add_product(std::int64_t m, std::int64_t n, std::int64_t k, const double* A, std::int64_t lda,
+                 const double* B, std::int64_t ldb, double* C) {
+  cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, blas(m), blas(n), blas(k), 1.0, A, blas(lda), B,
+              blas(ldb), 1.0, C, blas(n));
+}
+void add_product(std::int64_t m, std::int64_t n, std::int64_t k, const float* A, std::int64_t lda,
+                 const float* B, std::int64_t ldb, float* C) {
+  cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, blas(m), blas(n), blas(k), 1.0F, A, blas(lda), B,
+              blas(ldb), 1.0F, C, blas(n));
+}
+
+}  // namespace
+
+template <class Real>
+void multiply(const ForwardColumns<Real>& rows, const ForwardColumns<Real>& columns, std::span<Real> block) {
+  std::fill(block.begin(), block.end(), Real(0));
+  const std::vector<std::int64_t>&s = rows.of.supernodes, &t = columns.of.supernodes;
+  const auto common = [&](std::size_t i, std::size_t j) {
+    return i < s.size() && j < t.size() && s[i] == t[j] && rows.on_path(i) && columns.on_path(j);
+  };
+  for (std::size_t i = 0, j = 0; i < s.size() && j < t.size();) {
+    std::size_t run = 0;  // of supernodes that follow each other in both
+    while (common(i + run, j + run)) ++run;
+    if (run > 0) {
+      add_product(rows.count(), columns.count(), rows.of.row[i + run] - rows.of.row[i], rows.at(i),
+                  rows.of.column.back(), columns.at(j), columns.of.column.back(), block.data());
+      i += run;
+      j += run;
+    } else {
+      const bool first = s[i] <= t[j], second = t[j] <= s[i];
+      i += first ? 1 : 0;
+      j += second ? 1 : 0;
+    }
+  }
+}
 
 template <class Real>
 SelectedSolverOf<Real>::SelectedSolverOf(const Factor& factor, int jobs)
@@ -53,6 +92,51 @@ void SelectedSolverOf<Real>::solve(std::span<const std::int64_t> rows, std::span
     const Real* row = sweep.X.data() + position_[static_cast<std::size_t>(rows[r])] * width;
     std::copy_n(row, width, block.data() + static_cast<std::int64_t>(r) * width);
   }
+}
+
+template <class Real>
+ForwardSolution<Real> SelectedSolverOf<Real>::forward(std::span<const std::vector<std::int64_t>> clusters,
+                                                      Workspace& workspace) const {
+  const std::span<const Supernode> supernodes = sweeps_.supernodes();
+  std::vector<std::uint8_t>& on_path = workspace.wanted;
+  on_path.assign(supernodes.size(), 0);
+  ForwardSolution<Real> solution;
+  solution.column = {0};
+  for (std::size_t c = 0; c < clusters.size(); ++c) {
+    mark(clusters[c], workspace.sweep.on_path);
+    for (std::size_t s = 0; s < on_path.size(); ++s)
+      on_path[s] = static_cast<std::uint8_t>(on_path[s] | workspace.sweep.on_path[s] << c);
+    solution.column.push_back(solution.column.back() + std::ssize(clusters[c]));
+  }
+  workspace.row.resize(supernodes.size());
+  std::int64_t rows = 0;
+  for (std::size_t s = 0; s < on_path.size(); ++s) {
+    if (on_path[s] == 0) continue;
+    solution.supernodes.push_back(static_cast<std::int64_t>(s));
+    solution.on_path.push_back(on_path[s]);
+    solution.row.push_back(workspace.row[s] = rows);
+    rows += supernodes[s].columns;
+  }
+  solution.row.push_back(rows);
+  const std::int64_t width = solution.column.back();
+  solution.Y.resize(static_cast<std::size_t>(rows * width));
+  for (std::size_t c = 0; c < clusters.size(); ++c) {
+    for (std::size_t i = 0; i < clusters[c].size(); ++i) {
+      if (clusters[c][i] < 0) continue;
+      const std::int64_t position = position_[static_cast<std::size_t>(clusters[c][i])];
+      const auto s = static_cast<std::size_t>(sweeps_.supernode_of(position));
+      const std::int64_t row = workspace.row[s] + position - supernodes[s].first;
+      solution.Y[static_cast<std::size_t>(row * width + solution.column[c]) + i] = Real(1);
+    }
+  }
+  for (std::size_t k = 0; k < solution.supernodes.size(); ++k) {
+    const auto from = static_cast<std::size_t>(std::countr_zero(solution.on_path[k])),
+               to = static_cast<std::size_t>(std::bit_width(solution.on_path[k]));
+    sweeps_.forward(supernodes[static_cast<std::size_t>(solution.supernodes[k])], workspace.row,
+                    solution.column[from], solution.column[to], width, solution.Y.data(),
+                    workspace.sweep.below);
+  }
+  return solution;
 }
 
 /// Sets X to zero on the path.
@@ -103,20 +187,19 @@ void SelectedSolverOf<Real>::multiply(std::span<const std::int64_t> dofs, std::i
 }
 
 template <class Real>
-double SelectedSolverOf<Real>::flops(std::span<const std::int64_t> rows,
-                                     std::span<const std::int64_t> columns) const {
-  std::vector<std::uint8_t> on_path, wanted;
-  mark(columns, on_path);
-  mark(rows, wanted);
-  double total = 0.0;
+double SelectedSolverOf<Real>::forward_flops(std::span<const std::int64_t> dofs) const {
+  std::vector<std::uint8_t> on_path;
+  mark(dofs, on_path);
+  double of_column = 0.0;
   for (std::size_t s = 0; s < on_path.size(); ++s) {
     const Supernode& node = sweeps_.supernodes()[s];
-    total += static_cast<double>(node.columns * (node.columns + 2 * node.below)) *
-             ((on_path[s] ? 1.0 : 0.0) + (wanted[s] ? 1.0 : 0.0));
+    if (on_path[s]) of_column += static_cast<double>(node.columns * (node.columns + 2 * node.below));
   }
-  return total * static_cast<double>(columns.size());
+  return of_column * static_cast<double>(dofs.size());
 }
 
+template void multiply(const ForwardColumns<double>&, const ForwardColumns<double>&, std::span<double>);
+template void multiply(const ForwardColumns<float>&, const ForwardColumns<float>&, std::span<float>);
 template class SelectedSolverOf<double>;
 template class SelectedSolverOf<float>;
 

@@ -160,20 +160,41 @@ std::int64_t SupernodalSweeps<Real>::workspace_bytes(std::int64_t width) const {
   return (factor().order() + most_below()) * width * static_cast<std::int64_t>(sizeof(Real));
 }
 
+/// `row_of` is the row of X of a position.
 template <class Real>
-void SupernodalSweeps<Real>::forward(const Supernode& s, std::int64_t active, std::int64_t width,
-                                     Workspace& workspace) const {
+template <class RowOf>
+void SupernodalSweeps<Real>::forward_rows(const Supernode& s, std::int64_t active, std::int64_t width,
+                                          Real* X, Real* update, const RowOf& row_of) const {
   const std::int64_t ld = s.columns + s.below;
-  Real* X = workspace.X.data() + s.first * width;
-  divide(s, CblasTrans, active, width, X);
+  Real* X_s = X + row_of(s.first) * width;
+  divide(s, CblasTrans, active, width, X_s);
   if (s.below == 0) return;
-  Real* update = workspace.below.data();
-  multiply(CblasTrans, active, s.below, s.columns, Real(1), X, width, below(s), ld, Real(0), update, active);
+  multiply(CblasTrans, active, s.below, s.columns, Real(1), X_s, width, below(s), ld, Real(0), update,
+           active);
   for (const std::int64_t position : rows(s).subspan(static_cast<std::size_t>(s.columns))) {
-    Real* target = workspace.X.data() + position * width;
+    Real* target = X + row_of(position) * width;
     for (std::int64_t c = 0; c < active; ++c) target[c] -= update[c];
     update += active;
   }
+}
+
+template <class Real>
+void SupernodalSweeps<Real>::forward(const Supernode& s, std::int64_t active, std::int64_t width,
+                                     Workspace& workspace) const {
+  forward_rows(s, active, width, workspace.X.data(), workspace.below.data(),
+               [](std::int64_t position) { return position; });
+}
+
+template <class Real>
+void SupernodalSweeps<Real>::forward(const Supernode& s, std::span<const std::int64_t> row,
+                                     std::int64_t begin, std::int64_t end, std::int64_t width, Real* X,
+                                     std::vector<Real>& below) const {
+  const auto size = static_cast<std::size_t>(most_below() * (end - begin));
+  if (below.size() < size) below.resize(size);
+  forward_rows(s, end - begin, width, X + begin, below.data(), [&](std::int64_t position) {
+    const auto of = static_cast<std::size_t>(supernode_of(position));
+    return row[of] + position - supernodes()[of].first;
+  });
 }
 
 template <class Real>

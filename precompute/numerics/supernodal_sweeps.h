@@ -82,11 +82,19 @@ class SupernodalSweeps : public SupernodalTree {
   /// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s, for the first `active` of `width` right-hand sides.
   void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
 
+  /// As above, for right-hand sides [begin, end) of X [rows, width], which has rows of some supernodes only:
+  /// `row` [supernodes] is the first of each. All supernodes from s to the root must be among them.
+  void forward(const Supernode& s, std::span<const std::int64_t> row, std::int64_t begin, std::int64_t end,
+               std::int64_t width, Real* X, std::vector<Real>& below) const;
+
   /// X_s := L_ss^-T (X_s - L_bs^T X_below); X_s counts as zero if the supernode is not on the path.
   void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
                 Workspace& workspace) const;
 
  private:
+  template <class RowOf>
+  void forward_rows(const Supernode& s, std::int64_t active, std::int64_t width, Real* X, Real* update,
+                    const RowOf& row_of) const;
   /// X_s := X_s op(L_ss^-1), of the transpose that BLAS sees.
   void divide(const Supernode& s, CBLAS_TRANSPOSE op, std::int64_t active, std::int64_t width, Real* X) const;
   /// Entries below the diagonal block, in columns as long as the supernode has rows.

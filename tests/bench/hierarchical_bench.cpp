@@ -85,7 +85,7 @@ Forms make_forms(const StiffnessInput& body, const Surface& surface) {
                                    stored_dof_marks(body.mesh, surface, stiffness, Scope::surface, 0), {});
   ThreadSharing threads(processors());
   Compression compression(factor, stored.dofs, body.mesh.dimension(), stored.clusters, threads,
-                          [](CompressionStage, double) { return true; });
+                          std::int64_t{1} << 30, [](CompressionStage, double) { return true; });
   compression.prepare();
   std::shared_ptr<const HierarchicalMatrix> matrix = compression.compress(4e-4);
   Forms forms;

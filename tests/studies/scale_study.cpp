@@ -168,7 +168,7 @@ void report(const HierarchicalMatrix& matrix, const Options& options, const Prob
 void from_loads(const Options& options, const Problem& problem) {
   ThreadSharing threads(options.jobs);
   Compression compression(*problem.factor, problem.stored_dofs, problem.model.dimension(), problem.clusters,
-                          threads, [](CompressionStage, double) { return true; });
+                          threads, std::int64_t{1} << 30, [](CompressionStage, double) { return true; });
   compression.prepare();
   fmt::print("near pairs and random loads: {}\n", lap());
   std::fflush(stdout);

@@ -42,7 +42,7 @@ class Bar : public test::InvertedBody {
 
   [[nodiscard]] HierarchicalMatrix sketched(double cut) const {
     ThreadSharing one(1);
-    Compression compression(factor(), stored().dofs, 3, stored().clusters, one,
+    Compression compression(factor(), stored().dofs, 3, stored().clusters, one, 1 << 28,
                             [](CompressionStage, double) { return true; });
     compression.prepare();
     return *compression.compress(cut);

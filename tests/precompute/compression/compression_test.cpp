@@ -26,13 +26,15 @@ namespace {
 struct CompressionOptions {
   double cut = 1e-2;
   int jobs = 1;
+  std::int64_t forward_bytes = 1 << 28;
 };
 
 std::optional<HierarchicalMatrix> compress(const Factor& factor, std::span<const std::int64_t> stored_dofs,
                                            int dimension, const ClusteredNodes& nodes,
                                            const CompressionOptions& options, CompressionProgress progress) {
   ThreadSharing threads(options.jobs);
-  Compression compression(factor, stored_dofs, dimension, nodes, threads, std::move(progress));
+  Compression compression(factor, stored_dofs, dimension, nodes, threads, options.forward_bytes,
+                          std::move(progress));
   if (!compression.prepare()) return std::nullopt;
   const std::shared_ptr<HierarchicalMatrix> matrix = compression.compress(options.cut);
   return matrix == nullptr ? std::nullopt : std::optional(*matrix);
@@ -80,6 +82,12 @@ const Body& clamped_bar() {
 /// On rollers: stored nodes have dofs that are held.
 const Body& bar_on_rollers() {
   static const Body body(bar().hold(at_bottom, 4).hold(at_left, 3));
+  return body;
+}
+
+/// With so many leaves that several are solved for together.
+const Body& bar_of_small_leaves() {
+  static const Body body(bar().hold(at_left, 7), {.leaf = 2});
   return body;
 }
 
@@ -193,11 +201,13 @@ bool equal(const std::shared_ptr<const float[]>& a, const std::shared_ptr<const 
   return std::memcmp(a.get(), b.get(), static_cast<std::size_t>(count) * sizeof(float)) == 0;
 }
 
-TEST(Compression, DoesNotDependOnTheNumberOfJobs) {
-  for (const Body* body : {&clamped_bar(), &plate()}) {
+TEST(Compression, DoesNotDependOnJobsOrMemory) {
+  for (const Body* body : {&clamped_bar(), &plate(), &bar_of_small_leaves()}) {
     const HierarchicalMatrix one = body->compressed({.cut = 1e-3});
-    for (const int jobs : {2, 3}) {
-      const HierarchicalMatrix more = body->compressed({.cut = 1e-3, .jobs = jobs});
+    for (const auto& [jobs, forward_bytes] :
+         {std::pair(2, 1 << 28), std::pair(3, 1 << 28), std::pair(3, 1 << 16), std::pair(1, 0)}) {
+      const HierarchicalMatrix more =
+          body->compressed({.cut = 1e-3, .jobs = jobs, .forward_bytes = forward_bytes});
       ASSERT_EQ(one.rank, more.rank);
       EXPECT_TRUE(equal(one.basis, more.basis, one.basis_at.back()));
       EXPECT_TRUE(equal(one.transfer, more.transfer, one.transfer_at.back()));
@@ -205,6 +215,12 @@ TEST(Compression, DoesNotDependOnTheNumberOfJobs) {
       EXPECT_TRUE(equal(one.near, more.near, one.near_at.back()));
     }
   }
+}
+
+TEST(Compression, OfClustersSolvedForTogether) {
+  const Body& body = bar_of_small_leaves();
+  ASSERT_GT(clusters_together(body.stored().clusters.tree.levels), 1);
+  expect_compressed(body);
 }
 
 TEST(Compression, TellsOfItsProgressInOrder) {

@@ -188,29 +188,60 @@ TEST(SelectedSolver, InSinglePrecisionIsRounded) {
   }
 }
 
-TEST(SelectedSolver, MoreRowsOrColumnsAreNotFewerFlops) {
+/// Products of the forward solutions of some clusters with those of others, against the dense inverse.
+void expect_products(const Body& body, std::size_t together, std::mt19937_64& random) {
+  SelectedSolver::Workspace workspace;
+  std::vector<std::vector<Dofs>> groups(2);
+  std::vector<ForwardSolution<double>> solutions;
+  for (auto& group : groups) {
+    for (std::size_t c = 0; c < together; ++c) group.push_back(body.some(1 + random() % 20, random));
+    solutions.push_back(body.solver.forward(group, workspace));
+  }
+  for (std::size_t first = 0; first < together; ++first) {
+    Dofs rows;
+    for (std::size_t end = first + 1; end <= together; ++end) {
+      rows.insert(rows.end(), groups[0][end - 1].begin(), groups[0][end - 1].end());
+      const Dofs& columns = groups[1][first];
+      Rows block = Rows::Constant(std::ssize(rows), std::ssize(columns), 1e30);
+      multiply<double>({solutions[0], first, end}, {solutions[1], first, first + 1},
+                       {block.data(), static_cast<std::size_t>(block.size())});
+      ASSERT_LE((block - body.expected(rows, columns)).cwiseAbs().maxCoeff(),
+                1e-11 * body.inverse.cwiseAbs().maxCoeff())
+          << "clusters " << first << " to " << end << " of " << together;
+    }
+  }
+}
+
+TEST(SelectedSolver, ProductsOfForwardSolutionsAreBlocksOfTheInverse) {
+  std::mt19937_64 random(8);
+  for (const Body& body :
+       {Body(block().hold(at_bottom, 7)), Body(block(ElementType::hex8).hold(at_bottom, 7))}) {
+    for (const std::size_t together : {1, 2, 8}) expect_products(body, together, random);
+  }
+}
+
+TEST(SelectedSolver, MoreDofsAreNotFewerFlops) {
   const Body body(block().hold(at_bottom, 7));
   std::mt19937_64 random(6);
   const Dofs all = body.all();
   for (int k = 0; k < 20; ++k) {
-    Dofs rows = body.some(1, random), columns = body.some(1, random);
-    double last = body.solver.flops(rows, columns);
+    Dofs dofs = body.some(1, random);
+    double last = body.solver.forward_flops(dofs);
     for (int more = 0; more < 10; ++more) {
       const Dofs added = body.some(5, random);
-      Dofs& grown = more % 2 == 0 ? rows : columns;
-      grown.insert(grown.end(), added.begin(), added.end());
-      const double flops = body.solver.flops(rows, columns);
+      dofs.insert(dofs.end(), added.begin(), added.end());
+      const double flops = body.solver.forward_flops(dofs);
       EXPECT_GE(flops, last);
       last = flops;
     }
-    EXPECT_LE(last / static_cast<double>(columns.size()),
-              body.solver.flops(all, all) / static_cast<double>(all.size()));
+    EXPECT_LE(last / static_cast<double>(dofs.size()),
+              body.solver.forward_flops(all) / static_cast<double>(all.size()));
   }
-  EXPECT_EQ(body.solver.flops({}, {}), 0.0);
-  EXPECT_EQ(body.solver.flops(Dofs{-1}, Dofs{-1}), 0.0);
-  // All of L twice, off the diagonal a product and a sum, on it a division: about four flops an entry.
-  const double of_L = body.solver.flops(all, Dofs{0, 1, 2}) / 3.0;
-  EXPECT_LT(of_L, 4.1 * static_cast<double>(body.factor.entries()));
+  EXPECT_EQ(body.solver.forward_flops({}), 0.0);
+  EXPECT_EQ(body.solver.forward_flops(Dofs{-1}), 0.0);
+  // All of L, off the diagonal a product and a sum, on it a division: about two flops an entry.
+  const double of_L = body.solver.forward_flops(all) / static_cast<double>(all.size());
+  EXPECT_LT(of_L, 2.1 * static_cast<double>(body.factor.entries()));
 }
 
 }  // namespace

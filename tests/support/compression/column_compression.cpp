@@ -113,7 +113,9 @@ std::span<const std::int64_t> ColumnCompression::tile_columns(Index tile) const 
 }
 
 double ColumnCompression::flops_of(Index tile) const {
-  return solver_.flops(tile_rows(tile), tile_columns(tile));
+  const auto rows = tile_rows(tile), columns = tile_columns(tile);
+  return solver_.forward_flops(columns) +  // and backward to the rows, for each column
+         solver_.forward_flops(rows) * static_cast<double>(columns.size()) / static_cast<double>(rows.size());
 }
 
 double ColumnCompression::flops() const {
