@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ranges>
 
 #include "base/error.h"
 #include "precompute/compression/out_of_reach.h"
@@ -54,8 +53,13 @@ StoredNumbering reordered(const StoredNumbering& stored, const std::vector<Index
   return result;
 }
 
-auto leaves_of(const Tile& tile) {
-  return std::views::iota(static_cast<Index>(tile.first), static_cast<Index>(tile.first + tile.count));
+/// True if use(leaf) is for all leaves of a tile.
+template <class Use>
+bool each_of(const Tile& tile, const Use& use) {
+  const auto first = static_cast<Index>(tile.first), end = static_cast<Index>(tile.first + tile.count);
+  for (Index leaf = first; leaf < end; ++leaf)
+    if (!use(leaf)) return false;
+  return true;
 }
 
 std::vector<double> table_of(const std::vector<TouchErrors>& errors) {
@@ -102,20 +106,18 @@ class GreensCompressor {
   bool solve_near(const PieceRange& part) {
     std::vector<std::vector<float>> scratch(static_cast<std::size_t>(run_.jobs));
     stage_ = near_stage;
-    return solve_pieces(run_, near_tiles(plan_.frame), part,
-                        {near_stage, "those of ", "leaves", plan_.near_seconds,
-                         [&](const Tile& tile) {
-                           const auto leaves = leaves_of(tile);
-                           return std::all_of(leaves.begin(), leaves.end(),
-                                              [&](Index leaf) { return writer_.has_near(leaf); });
-                         },
-                         [&](const Tile& tile, int worker) {
-                           std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
-                           for (const Index leaf : leaves_of(tile)) {
-                             compression_.solve_near(leaf, worker, entries);
-                             writer_.write_near(leaf, entries);
-                           }
-                         }});
+    return solve_pieces(
+        run_, near_tiles(plan_.frame), part,
+        {near_stage, "those of ", "leaves", plan_.near_seconds,
+         [&](const Tile& tile) { return each_of(tile, [&](Index leaf) { return writer_.has_near(leaf); }); },
+         [&](const Tile& tile, int worker) {
+           std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
+           each_of(tile, [&](Index leaf) {
+             compression_.solve_near(leaf, worker, entries);
+             writer_.write_near(leaf, entries);
+             return true;
+           });
+         }});
   }
 
   /// The matrix, with the near pairs of the file, which has all. Null when interrupted.

@@ -58,7 +58,7 @@ void BlockSolver<Real>::solve(std::span<const Index> rows, Index column, int wor
 
 /// The forward solution of a group, which the first thread that asks for it makes.
 template <class Real>
-BlockSolver<Real>::Promised BlockSolver<Real>::forward(Index group, int worker) {
+typename BlockSolver<Real>::Promised BlockSolver<Real>::forward(Index group, int worker) {
   std::promise<Solution> promise;
   Promised promised = promise.get_future().share();
   {

@@ -46,12 +46,13 @@ DoubleRows product(const HierarchicalMatrix& matrix, const DoubleRows& f, int jo
   for_level(tree.levels, [&](Index leaf) {
     strength[at(leaf)] = V(leaf).transpose() * f.middleRows(first_dof(matrix, leaf), rows_of(leaf));
   });
-  for (int level = tree.levels - 1; level > 0; --level)
+  for (int level = tree.levels - 1; level > 0; --level) {
     for_level(level, [&](Index c) {
       strength[at(c)] = E(2 * c + 1).transpose() * strength[at(2 * c + 1)] +
                         E(2 * c + 2).transpose() * strength[at(2 * c + 2)];
     });
-  for (int level = 0; level <= tree.levels; ++level)
+  }
+  for (int level = 0; level <= tree.levels; ++level) {
     for_level(level, [&](Index c) {
       terms[at(c)] = DoubleRows::Zero(matrix.rank[at(c)], f.cols());
       if (c > 0) terms[at(c)] += E(c) * terms[at(ClusterTree::parent(c))];
@@ -67,6 +68,7 @@ DoubleRows product(const HierarchicalMatrix& matrix, const DoubleRows& f, int jo
         }
       }
     });
+  }
   for_level(tree.levels, [&](Index leaf) {
     u.middleRows(first_dof(matrix, leaf), rows_of(leaf)) =
         near_displacement(matrix, leaf, f) + V(leaf) * terms[at(leaf)];
