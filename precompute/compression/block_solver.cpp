@@ -70,6 +70,7 @@ typename BlockSolver<Real>::Promised BlockSolver<Real>::forward(Index group, int
   }
   try {
     std::vector<Dofs> clusters;
+    clusters.reserve(static_cast<std::size_t>(together_));
     for (Index c = 0; c < together_; ++c) clusters.push_back(dofs_of_(first_ + group * together_ + c));
     promise.set_value(std::make_shared<const ForwardSolution<Real>>(
         solver_.forward(clusters, workspaces_[static_cast<std::size_t>(worker)])));
