@@ -16,13 +16,14 @@ namespace {
 using Dofs = std::vector<std::int64_t>;
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double skeleton_share = 0.2;      // of the cut: skeletons must not add to the error
-constexpr Index leaves_estimated = 64;      // to estimate flops
-constexpr std::int64_t loads_at_once = 32;  // solved together
-constexpr Index checks = 32;                // more loads, to measure the error of the pairs
-constexpr double near_work = 1.6;           // of forward solutions: some are made twice, and multiplied
-constexpr std::int64_t near_forward = 2;    // forward solutions, while random loads do not need memory yet
-constexpr double single_share = 0.3;        // of the skeletons' cut, that single precision may add
+constexpr double skeleton_share = 0.2;       // of the cut: skeletons must not add to the error
+constexpr Index leaves_estimated = 64;       // to estimate flops
+constexpr std::int64_t loads_at_once = 32;   // solved together
+constexpr std::int64_t checked_at_once = 8;  // of these, by a thread
+constexpr Index checks = 32;                 // more loads, to measure the error of the pairs
+constexpr double near_work = 1.6;            // of forward solutions: some are made twice, and multiplied
+constexpr std::int64_t near_forward = 2;     // forward solutions, while random loads do not need memory yet
+constexpr double single_share = 0.3;         // of the skeletons' cut, that single precision may add
 
 /// Xi f for loads f [order x loads]: up the tree, across the far pairs, down the tree, and the near pairs.
 DoubleRows product(const HierarchicalMatrix& matrix, const DoubleRows& f, int jobs) {
@@ -195,31 +196,33 @@ Eigen::VectorXd Compression::weighed_rows(DoubleRows u) const {
 }
 
 /// Measures what solves in single precision are off by.
-bool Compression::try_single() {
-  if (solver_.factor().spread_numbers() != nullptr) return true;  // it has no numbers to round
-  SharedItems once;
-  once.count = 1;
-  once.work = [&](std::int64_t, int) {
-    const SelectedSolverOf<float> solver(solver_.factor(), sharing_.jobs());
-    SelectedSolverOf<float>::Workspace workspace;
-    const FloatRows f = load_.rightCols(checks).cast<float>();
+void Compression::try_single() {
+  if (solver_.factor().spread_numbers() != nullptr) return;  // it has no numbers to round
+  const SelectedSolverOf<float> solver(solver_.factor(), sharing_.jobs());
+  std::vector<SelectedSolverOf<float>::Workspace> workspaces(at(sharing_.jobs()));
+  DoubleRows off = response_.rightCols(checks);
+  parallel_for(checks / checked_at_once, sharing_.jobs(), [&](std::int64_t block, int worker) {
+    const std::int64_t first = block * checked_at_once;
+    const FloatRows f = load_.middleCols(random_loads + first, checked_at_once).cast<float>();
     FloatRows u(f.rows(), f.cols());
-    solver.multiply(stored_dofs_, checks, {f.data(), at(f.size())}, workspace, {u.data(), at(u.size())});
-    const Eigen::VectorXd rows = weighed_rows(response_.rightCols(checks) - u.cast<double>());
-    single_error_ = 0.0;
-    for (Index c = matrix_.tree.first_leaf(); c < matrix_.tree.clusters(); ++c) {
-      const std::int64_t first = first_dof(matrix_, c), count = end_dof(matrix_, c) - first;
-      single_error_ = std::max(single_error_, rows.segment(first, count).norm() / std::sqrt(double(count)));
-    }
-  };
-  once.carry = [&](std::int64_t, Parcel& results) { results.carry(single_error_); };
-  return sharing_.for_each(once);
+    solver.multiply(stored_dofs_, f.cols(), {f.data(), at(f.size())}, workspaces[at(worker)],
+                    {u.data(), at(u.size())});
+    off.middleCols(first, checked_at_once) -= u.cast<double>();
+  });
+  const Eigen::VectorXd rows = weighed_rows(std::move(off));
+  single_error_ = 0.0;
+  for (Index c = matrix_.tree.first_leaf(); c < matrix_.tree.clusters(); ++c) {
+    const std::int64_t first = first_dof(matrix_, c), count = end_dof(matrix_, c) - first;
+    single_error_ = std::max(single_error_, rows.segment(first, count).norm() / std::sqrt(double(count)));
+  }
 }
 
 bool Compression::prepare(const FetchNear& fetch) {
-  const bool whole = gather_near(fetch) && sample() && try_single();
+  if (!gather_near(fetch)) return false;
   near_solver_.reset();  // frees its memory
-  return whole;
+  if (!sample()) return false;
+  try_single();
+  return true;
 }
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {

@@ -66,7 +66,7 @@ class Compression {
   void solve_near_of(Index leaf, int worker, std::span<float> entries);
   bool gather_near(const FetchNear& fetch);
   bool sample();
-  bool try_single();
+  void try_single();
   void check(HierarchicalMatrix& matrix) const;
   [[nodiscard]] Eigen::VectorXd weighed_rows(DoubleRows u) const;
 

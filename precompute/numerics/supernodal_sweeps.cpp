@@ -105,9 +105,11 @@ SupernodalSweeps<Real>::SupernodalSweeps(const Factor& factor, int jobs) : Super
     inverse_at_.push_back(size);
     size += s.columns * s.columns;
   }
-  inverse_.resize(static_cast<std::size_t>(size));
+  // Not zeroed, which one thread would do.
+  inverse_ = std::make_unique_for_overwrite<Real[]>(static_cast<std::size_t>(size));
   constexpr bool rounded = std::is_same_v<Real, float>;
-  if constexpr (rounded) copy_.resize(static_cast<std::size_t>(factor.entries()));
+  if constexpr (rounded)
+    copy_ = std::make_unique_for_overwrite<Real[]>(static_cast<std::size_t>(factor.entries()));
   parallel_for(std::ssize(supernodes()), jobs, [&](std::int64_t item, int) {
     const Supernode& s = supernodes()[static_cast<std::size_t>(item)];
     const std::int64_t ld = s.columns + s.below;
@@ -117,18 +119,18 @@ SupernodalSweeps<Real>::SupernodalSweeps(const Factor& factor, int jobs) : Super
       std::copy_n(from + j * (ld + 1), s.columns - j, block.data() + j * (s.columns + 1));
     invert(s.columns, block.data(), s.columns);
     const auto as_real = [](double value) { return static_cast<Real>(value); };
-    std::transform(block.begin(), block.end(), inverse_.begin() + inverse_at_[static_cast<std::size_t>(item)],
+    std::transform(block.begin(), block.end(), inverse_.get() + inverse_at_[static_cast<std::size_t>(item)],
                    as_real);
-    if constexpr (rounded) std::transform(from, from + s.columns * ld, copy_.begin() + s.values, as_real);
+    if constexpr (rounded) std::transform(from, from + s.columns * ld, copy_.get() + s.values, as_real);
   });
 }
 
 template <class Real>
 void SupernodalSweeps<Real>::divide(const Supernode& s, CBLAS_TRANSPOSE op, std::int64_t active,
                                     std::int64_t width, Real* X) const {
-  if (!inverse_.empty()) {
+  if (inverse_ != nullptr) {
     const auto number = static_cast<std::size_t>(&s - supernodes().data());
-    multiply_lower(op, active, s.columns, inverse_.data() + inverse_at_[number], X, width);
+    multiply_lower(op, active, s.columns, inverse_.get() + inverse_at_[number], X, width);
   } else if constexpr (std::is_same_v<Real, double>) {
     cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, op, CblasNonUnit, blas(active), blas(s.columns), 1.0,
                 static_cast<const double*>(factor().supernodal().x) + s.values, blas(s.columns + s.below), X,
@@ -139,7 +141,7 @@ void SupernodalSweeps<Real>::divide(const Supernode& s, CBLAS_TRANSPOSE op, std:
 template <class Real>
 const Real* SupernodalSweeps<Real>::below(const Supernode& s) const noexcept {
   if constexpr (std::is_same_v<Real, float>)
-    return copy_.data() + s.values + s.columns;
+    return copy_.get() + s.values + s.columns;
   else
     return static_cast<const double*>(factor().supernodal().x) + s.values + s.columns;
 }

@@ -4,6 +4,7 @@
 #include <cblas.h>
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -100,9 +101,9 @@ class SupernodalSweeps : public SupernodalTree {
   /// Entries below the diagonal block, in columns as long as the supernode has rows.
   [[nodiscard]] const Real* below(const Supernode& s) const noexcept;
 
-  std::vector<Real> inverse_;             // of the diagonal blocks, one after the other, column-major
+  std::unique_ptr<Real[]> inverse_;       // of the diagonal blocks, one after the other, column-major
   std::vector<std::int64_t> inverse_at_;  // [supernodes]
-  std::vector<float> copy_;               // in single precision, as the factor's
+  std::unique_ptr<Real[]> copy_;          // in single precision, as the factor's
 };
 
 }  // namespace palpate
