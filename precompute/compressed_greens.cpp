@@ -113,6 +113,7 @@ class GreensCompressor {
          [&](const Tile& tile, int worker) {
            std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
            each_of(tile, [&](Index leaf) {
+             if (writer_.has_near(leaf)) return true;
              compression_.solve_near(leaf, worker, entries);
              writer_.write_near(leaf, entries);
              return true;
