@@ -58,7 +58,9 @@ class BlockSolver {
   bool look_ahead(Index group, int worker);
   void keep(Index group, std::int64_t bytes);
 
-  Index first_, together_, groups_;  // cluster of the level; clusters in a group
+  Index first_;     // cluster of the level
+  Index together_;  // clusters of a group
+  Index groups_;    // of the level
 
   const SelectedSolverOf<Real>& solver_;
   std::vector<typename SelectedSolverOf<Real>::Workspace> workspaces_;  // [jobs]

@@ -22,7 +22,7 @@ constexpr std::int64_t loads_at_once = 32;   // solved together
 constexpr std::int64_t checked_at_once = 8;  // of these, by a thread
 constexpr Index checks = 32;                 // more loads, to measure the error of the pairs
 constexpr double near_work = 1.6;            // of forward solutions: some are made twice, and multiplied
-constexpr std::int64_t near_forward = 2;     // forward solutions, while random loads do not need memory yet
+constexpr std::int64_t near_forward = 2;     // times the memory, as random loads need none yet
 constexpr double single_share = 0.3;         // of the skeletons' cut, that single precision may add
 
 /// Xi f for loads f [order x loads]: up the tree, across the far pairs, down the tree, and the near pairs.
