@@ -9,80 +9,77 @@
 
 #include "runtime/core/body/elastic_body.h"
 #include "runtime/core/body/greens_on_top.h"
+#include "runtime/core/body/half_space.h"
+#include "runtime/core/body/wedges.h"
 
 namespace palpate {
 namespace {
 
 using Point = LocalCompliance::Point;
+using half_space::Beside;
+using half_space::Fade;
+using half_space::least_share;
+using half_space::of_lattice;
 
 constexpr double edges_of_reach = 4.0;
-// Compliance of a node by its own force, times pi E / (1 - nu^2) and the radius of its disc: what is left of
-// an even load on a lattice once the other nodes are point loads (2.20 for squares, 2.21 for triangles).
-constexpr double of_lattice = 2.2;
-constexpr double least_share = 1e-9;  // below it two normals have no mean
+constexpr double sharp =
+    40.0 * std::numbers::pi / 180.0;     // [rad], below it an edge is round: overlay/rounding.h
+constexpr double of_right_angle = 0.75;  // image of a point force in an edge of 90 degrees
+constexpr double least_angle = std::numbers::pi / 3.0;  // of a wedge: the sharpest that was measured
 
 std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
-/// Share of two points' half-space: 1 on a flat side, less round an edge, 0 on both sides of a plate.
-double share_of_sides(const Point& a, const Point& b) noexcept {
-  return 0.5 * (1.0 + a.normal.dot(b.normal));
-}
-
-/// Share of the half-space that is left at a distance r: 1 at 0, 0 from the mean of two reaches on.
-inline double left_at(double squared_r, double sum_of_reaches) noexcept {
-  const double left = std::max(0.0, 1.0 - 4.0 * squared_r / (sum_of_reaches * sum_of_reaches));
-  return left * left;
-}
-
-/// Point as the half-space sees it, in plain numbers, so that loops over points use the vector units.
-struct Numbers {
-  double x, y, z, u, v, w;  // place, normal
-  double reach, disc;
-};
-
-/// Fading of the half-space.
-enum class Fade : std::uint8_t { by_distance, none };
-
-/// B along all axes, by rows, times pi E / (1 + nu) [1/m]: displacement of the half-space's surface at `a` by
-/// a force at `b` (Johnson, Contact Mechanics, 1985, 3.2 and 3.6); at `b` itself by the force on its own
-/// part.
-template <Fade fade>
-inline std::array<double, 9> half_space(const Numbers& a, const Numbers& b, double nu) noexcept {
-  const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-  const double r2 = dx * dx + dy * dy + dz * dz;
-  const double sides = 0.5 * (1.0 + a.u * b.u + a.v * b.v + a.w * b.w);
-  const double of_n = 0.5 / std::sqrt(std::max(sides, least_share));
-  const double nx = of_n * (a.u + b.u), ny = of_n * (a.v + b.v), nz = of_n * (a.w + b.w);
-  const bool is_own = r2 == 0.0;
-  const double of_r = is_own ? of_lattice / b.disc : 1.0 / std::sqrt(r2);
-  const double left = fade == Fade::none ? 1.0 : left_at(r2, a.reach + b.reach);
-  const double on_both = sides < least_share ? 0.0 : sides * left;
-  const double factor = of_r * (is_own ? 1.0 : on_both);
-  const double along = dx * nx + dy * ny + dz * nz;
-  const double qx = is_own ? a.u : of_r * (dx - along * nx), qy = is_own ? a.v : of_r * (dy - along * ny),
-               qz = is_own ? a.w : of_r * (dz - along * nz);
-  const double even = factor * (is_own ? 1.0 - 0.5 * nu : 1.0 - nu),
-               by_q = factor * (is_own ? -0.5 * nu : nu),
-               turned = is_own ? 0.0 : factor * 0.5 * (1.0 - 2.0 * nu);
-  const double xy = by_q * qx * qy, xz = by_q * qx * qz, yz = by_q * qy * qz;
-  const double turned_xy = turned * (qx * ny - nx * qy), turned_xz = turned * (qx * nz - nx * qz),
-               turned_yz = turned * (qy * nz - ny * qz);
-  return {even + by_q * qx * qx, xy + turned_xy, xz + turned_xz, xy - turned_xy,       even + by_q * qy * qy,
-          yz + turned_yz,        xz - turned_xz, yz - turned_yz, even + by_q * qz * qz};
-}
-
-Numbers numbers_of(const Point& p) noexcept {
-  return {p.x.x(), p.x.y(), p.x.z(), p.normal.x(), p.normal.y(), p.normal.z(), p.reach, p.disc};
+half_space::Numbers numbers_of(const Point& p) noexcept {
+  return {p.x.x(),
+          p.x.y(),
+          p.x.z(),
+          p.normal.x(),
+          p.normal.y(),
+          p.normal.z(),
+          p.reach,
+          p.disc,
+          p.edges[0].distance,
+          p.edges[0].image,
+          p.edges[1].distance,
+          p.edges[1].image};
 }
 
 /// B along free axes, times pi E / (1 + nu) [1/m].
 template <Fade fade>
 Mat3 block(const Point& a, const Point& b, double nu) noexcept {
-  const std::array<double, 9> of_all = half_space<fade>(numbers_of(a), numbers_of(b), nu);
+  const std::array<double, 9> of_all =
+      half_space::compliance<fade, Beside::edges>(numbers_of(a), numbers_of(b), nu);
   return a.share.asDiagonal() * Mat3(Eigen::Map<const Mat3>(of_all.data()).transpose()) *
          b.share.asDiagonal();
+}
+
+/// Adds `part` of B to a point's rows.
+template <Beside beside>
+void add_rows(const Point& a, double part, double nu, const LocalPoints& loaded, Index count,
+              double* rows) noexcept {
+  std::array<const double*, LocalPoints::components> of{};
+  for (std::size_t k = 0; k < of.size(); ++k) of[k] = loaded[static_cast<Index>(k)];
+  const auto& [x, y, z, u, v, w, share_x, share_y, share_z, reach, disc, t, image, t_too, image_too] = of;
+  const half_space::Numbers of_a = numbers_of(a);
+  const double ax = part * a.share.x(), ay = part * a.share.y(), az = part * a.share.z();
+  double *row_x = rows, *row_y = rows + std::ptrdiff_t{3} * count, *row_z = rows + std::ptrdiff_t{6} * count;
+#pragma omp simd
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
+    const half_space::Numbers b{x[k],     y[k],    z[k], u[k],     v[k],     w[k],
+                                reach[k], disc[k], t[k], image[k], t_too[k], image_too[k]};
+    const auto B = half_space::compliance<Fade::by_distance, beside>(of_a, b, nu);
+    row_x[3 * k] += ax * share_x[k] * B[0];
+    row_x[3 * k + 1] += ax * share_y[k] * B[1];
+    row_x[3 * k + 2] += ax * share_z[k] * B[2];
+    row_y[3 * k] += ay * share_x[k] * B[3];
+    row_y[3 * k + 1] += ay * share_y[k] * B[4];
+    row_y[3 * k + 2] += ay * share_z[k] * B[5];
+    row_z[3 * k] += az * share_x[k] * B[6];
+    row_z[3 * k + 1] += az * share_y[k] * B[7];
+    row_z[3 * k + 2] += az * share_z[k] * B[8];
+  }
 }
 
 /// Xi - D, with D by blocks between stored nodes.
@@ -187,19 +184,19 @@ class MeshPart {
   [[nodiscard]] std::vector<std::vector<SmoothGreens::Block>> blocks(double reach) const {
     std::vector<std::vector<SmoothGreens::Block>> rows(at(body_.greens().nodes()));
     for (Index node = 0; node < std::ssize(beside_); ++node) {
-      if (is_free(node)) enter(node, node, xi(node, node) - smooth_[at(node)], rows);
+      if (is_free(node))
+        enter(node, node, xi(node, node) - smooth_[at(node)] - near(node, node) + faded(node, node), rows);
       for (const Index other : beside_[at(node)]) {
         if (other < node || !is_free(node) || !is_free(other)) continue;
-        const double side = share_of_sides(points_[at(node)], points_[at(other)]);
+        const double side = sides(node, other);
         const Mat3 smooth = 0.5 * (smooth_[at(node)] + smooth_[at(other)]);
-        const double faded = 1.0 - left(node, other);
-        enter(node, other, side * (xi(node, other) - smooth) - faded * near(node, other), rows);
+        enter(node, other, side * (xi(node, other) - smooth) - near(node, other) + faded(node, other), rows);
       }
     }
     for_each_pair(points_, beside_.size(), reach, [&](Index a, Index b) {
       if (!is_free(a) || !is_free(b) || beside_[at(a)].contains(b)) return;
-      const double share = left(a, b);
-      if (share > 0.0) enter(a, b, share * near(a, b), rows);
+      const Mat3 B = faded(a, b);
+      if (!B.isZero(0.0)) enter(a, b, B, rows);
     });
     return rows;
   }
@@ -210,13 +207,15 @@ class MeshPart {
     return stored(node) >= 0 && !points_[at(node)].share.isZero(0.0);
   }
   [[nodiscard]] Mat3 xi(Index a, Index b) const { return body_.greens().block(stored(a), stored(b)); }
-  [[nodiscard]] double left(Index a, Index b) const noexcept {
-    const Point &of_a = points_[at(a)], &of_b = points_[at(b)];
-    return left_at((of_a.x - of_b.x).squaredNorm(), of_a.reach + of_b.reach);
+  [[nodiscard]] double sides(Index a, Index b) const noexcept {
+    return half_space::share_of_sides(points_[at(a)].normal.dot(points_[at(b)].normal));
   }
   /// The half-space between two nodes, not faded.
   [[nodiscard]] Mat3 near(Index a, Index b) const noexcept {
     return c_ * block<Fade::none>(points_[at(a)], points_[at(b)], nu_);
+  }
+  [[nodiscard]] Mat3 faded(Index a, Index b) const noexcept {
+    return c_ * block<Fade::by_distance>(points_[at(a)], points_[at(b)], nu_);
   }
 
   /// Mean of Xi - B at the nodes two edges away, where the mesh is right; of those one edge away if there are
@@ -233,7 +232,7 @@ class MeshPart {
     double weight = 0.0;
     for (const Index other : ring) {
       if (!is_free(other)) continue;
-      const double share = share_of_sides(points_[at(node)], points_[at(other)]);
+      const double share = sides(node, other);
       if (share < least_share) continue;
       sum += share * xi(node, other) - near(node, other);
       weight += share;
@@ -263,6 +262,7 @@ LocalCompliance::LocalCompliance(const ElasticBody& body, std::span<const Index>
   measure(body);
   follow(body, mesh);
   for (const Point& point : points_) reach_ = std::max(reach_, point.reach);
+  find_edges(body);
   smooth_ = std::make_unique<const SmoothGreens>(body.shared_greens(),
                                                  MeshPart(body, mesh, points_, c_, nu_).blocks(reach_));
 }
@@ -292,6 +292,21 @@ void LocalCompliance::measure(const ElasticBody& body) {
     for (const Index node : simplices.subspan(s, 3)) {
       Point& point = points_[at(node)];
       point.crease = std::max(point.crease, std::acos(std::clamp(normal.dot(point.normal), -1.0, 1.0)));
+    }
+  }
+}
+
+/// Finds the edges beside each point. Their images are as measured on wedges of 60, 90, 120 and 135 degrees
+/// (scripts/studies/edges).
+void LocalCompliance::find_edges(const ElasticBody& body) {
+  const auto found = wedges_beside(body.surface_rest_positions(), body.simplices(), sharp, reach_);
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    for (std::size_t e = 0; e < found[k].size(); ++e) {
+      const auto [distance, angle] = found[k][e];
+      if (std::isinf(distance)) continue;
+      // At the edge itself the image of a point's part of the surface is that part again.
+      points_[k].edges[e] = {distance + 0.5 * points_[k].disc / of_lattice,
+                             of_right_angle / std::pow(std::tan(0.5 * std::max(angle, least_angle)), 3.0)};
     }
   }
 }
@@ -374,27 +389,9 @@ Mat3 LocalCompliance::between(const Point& a, const Point& b) const noexcept {
 
 void LocalCompliance::add_row(const Point& a, const LocalPoints& loaded, Index count,
                               double* rows) const noexcept {
-  const double *x = loaded[0], *y = loaded[1], *z = loaded[2], *u = loaded[3], *v = loaded[4], *w = loaded[5],
-               *share_x = loaded[6], *share_y = loaded[7], *share_z = loaded[8], *reach = loaded[9],
-               *disc = loaded[10];
-  const Numbers of_a = numbers_of(a);
-  const double nu = nu_, part = c_ * a.part;
-  const double ax = part * a.share.x(), ay = part * a.share.y(), az = part * a.share.z();
-  double *row_x = rows, *row_y = rows + std::ptrdiff_t{3} * count, *row_z = rows + std::ptrdiff_t{6} * count;
-#pragma omp simd
-  for (std::ptrdiff_t k = 0; k < count; ++k) {
-    const auto B =
-        half_space<Fade::by_distance>(of_a, {x[k], y[k], z[k], u[k], v[k], w[k], reach[k], disc[k]}, nu);
-    row_x[3 * k] += ax * share_x[k] * B[0];
-    row_x[3 * k + 1] += ax * share_y[k] * B[1];
-    row_x[3 * k + 2] += ax * share_z[k] * B[2];
-    row_y[3 * k] += ay * share_x[k] * B[3];
-    row_y[3 * k + 1] += ay * share_y[k] * B[4];
-    row_y[3 * k + 2] += ay * share_z[k] * B[5];
-    row_z[3 * k] += az * share_x[k] * B[6];
-    row_z[3 * k + 1] += az * share_y[k] * B[7];
-    row_z[3 * k + 2] += az * share_z[k] * B[8];
-  }
+  const bool has_edges = a.edges[0].image > 0.0;
+  const auto add = has_edges ? add_rows<Beside::edges> : add_rows<Beside::nothing>;
+  add(a, c_ * a.part, nu_, loaded, count, rows);
 }
 
 void LocalPoints::set(Index place, const LocalCompliance::Point& point) noexcept {
@@ -405,8 +402,11 @@ void LocalPoints::set(Index place, const LocalCompliance::Point& point) noexcept
       to += room_;
     }
   }
-  to[0] = point.reach;
-  to[room_] = point.disc;
+  for (const double component : {point.reach, point.disc, point.edges[0].distance, point.edges[0].image,
+                                 point.edges[1].distance, point.edges[1].image}) {
+    *to = component;
+    to += room_;
+  }
 }
 
 void LocalPoints::move(Index from, Index to) noexcept {

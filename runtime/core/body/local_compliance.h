@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -39,9 +40,15 @@ class LocalCompliance {
     Vec3 x = Vec3::Zero(), normal = Vec3::Zero();
     Vec3 share = Vec3::Zero();  ///< of each axis that is free: 1, on held nodes 0
     double reach = 0.0;         ///< [m] four edges
-    double part = 1.0;    ///< of B and D that count: less near nodes that are held along some axes, 0 there
-    double disc = 0.0;    ///< radius of the disc as large as its part of the surface [m]
-    Index follows = 0;    ///< stored node with the largest share of its displacement
+    double part = 1.0;  ///< of B and D that count: less near nodes that are held along some axes, 0 there
+    double disc = 0.0;  ///< radius of the disc as large as its part of the surface [m]
+    Index follows = 0;  ///< stored node with the largest share of its displacement
+    /// Sharp edge of the body beside it.
+    struct Edge {
+      double distance = 0.0;  ///< [m]
+      double image = 0.0;     ///< of a force there, in (1 + nu) / (pi E r); 0: no edge
+    };
+    std::array<Edge, 2> edges;
     double crease = 0.0;  ///< [rad] largest angle between the normal and those of the faces around
   };
   [[nodiscard]] const Point& point(Index node) const noexcept {
@@ -56,6 +63,7 @@ class LocalCompliance {
 
  private:
   void measure(const ElasticBody& body);
+  void find_edges(const ElasticBody& body);
   double set_reach_by_edges(std::size_t of_body, std::span<const Index> mesh);
   void follow(const ElasticBody& body, std::span<const Index> mesh);
   void fade_at_planes(const ElasticBody& body, const std::vector<Vec3>& free);
@@ -69,7 +77,7 @@ class LocalCompliance {
 /// Points by their components, for loops over all of them.
 class LocalPoints {
  public:
-  static constexpr Index components = 11;  ///< x, normal, share times part, reach, disc
+  static constexpr Index components = 15;  ///< x, normal, share times part, reach, disc, edges
 
   explicit LocalPoints(Index room) : room_(room), of_(static_cast<std::size_t>(components * room)) {}
 
