@@ -54,7 +54,7 @@ inline Body make_body(Model model, const StateOptions& options, const palpate_ov
   const bool is_deep = contact == ContactModel::two_level;
   if (overlay.refinement > 0 && !is_deep) return Body(std::move(model), {}, overlay.refinement, contact);
   double radius = std::numeric_limits<double>::infinity();
-  for (const Tool& tool : options.tools) radius = std::min(radius, has_point_core(tool) ? tool.radius : 0.0);
+  for (const Tool& tool : options.tools) radius = std::min(radius, is_compact(tool) ? tool.radius : 0.0);
   const bool is_static = contact != ContactModel::dynamic && overlay.refinement == 0 && is_even(model);
   const MetSurface met = is_static && radius > 0.0 ? met_surface(model, radius) : MetSurface{};
   if (is_deep) return deep_body(std::move(model), met.refinement, met.is_local);

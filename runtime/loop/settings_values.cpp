@@ -26,8 +26,7 @@ WorkspaceOptions Settings::workspace() const {
 }
 
 BodyOptions Settings::body() const {
-  // A capsule or disc touches faces and edges as well: of a fine surface far too many.
-  const bool is_possible = has_point_core(tool) && contact == ContactModel::quasi_static && !live.solver;
+  const bool is_possible = is_compact(tool) && contact == ContactModel::quasi_static && !live.solver;
   const bool by_radius =
       overlay.kind == OverlayKind::graded ||
       (overlay.kind == OverlayKind::local && is_possible && overlay_law == PatchLaw::linear);

@@ -167,11 +167,14 @@ class Edge(ProgramTest):
     # apart it is 0.2 % less).
     PLACES = [(5.0, 31.3, 16.23), (2.5, 31.3, 13.56), (1.0, 31.3, 10.90), (0.5, 31.3, 9.80), (0.0, 31.3, 8.54), (2.5, 57.5, 9.75), (0.5, 59.5, 5.31), (28.7, 31.3, 19.29)]
 
-    def press(self, element, cells):
-        """Force over the fine mesh's at each place."""
-        body = self.bake(f'name = "block"\n[geometry]\nbox = {{size = [0.06, 0.06, 0.03], cells = [{cells}, {cells}, {cells // 2}]}}\n[mesh]\nelement = "{element}"\n'
+    def block(self, element, cells):
+        return self.bake(f'name = "block"\n[geometry]\nbox = {{size = [0.06, 0.06, 0.03], cells = [{cells}, {cells}, {cells // 2}]}}\n[mesh]\nelement = "{element}"\n'
                          '[material]\nyoungs_modulus = 5e3\npoissons_ratio = 0.45\n[[fixed]]\nhalf_space = {point = [0, 0, 0], normal = [0, 0, -1]}\n'
                          '[storage]\nscope = "surface"\n', name=f"{element}.toml")
+
+    def press(self, element, cells):
+        """Force over the fine mesh's at each place."""
+        body = self.block(element, cells)
         rows, t, ends = ["t,x,y,z"], 0.0, []
         for distance, y, _ in self.PLACES:
             for z, pause in ((0.037, 0.01), (0.0352, 0.02), (0.034, 0.04), (0.034, 0.1), (0.037, 0.02)):
@@ -188,3 +191,14 @@ class Edge(ProgramTest):
         for element, cells, error in (("tet4", 10, 0.07), ("tet10", 5, 0.04)):
             for place, ratio in zip(self.PLACES, self.press(element, cells)):
                 self.assertLess(abs(ratio - 1.0), error, (element, place))  # 0.1 to 1.5 without images
+
+    def test_a_capsule_feels_the_body(self):
+        lying = "0.70710678,0,0.70710678,0"  # along x
+        script = self.write("lie.csv", "t,x,y,z,qw,qx,qy,qz\n" + "".join(
+            f"{t},0.0273,0.0313,{0.03 + z},{lying}\n" for t, z in ((0, 0.006), (0.02, 0.0042), (0.1, 0.003), (0.2, 0.003))))
+        for element, cells in (("tet4", 10), ("tet10", 5)):
+            done(RUNTIME, "play", self.block(element, cells), "--device", f"script:{script}", "--tool", "capsule:0.004,0.008", "--friction", "0", "--depth", "no", "--fast",
+                         "--record", self.folder / "run.mcap", "--report", self.folder / "report.json", "--force")
+            force = -1e3 * palpate.read(self.folder / "run.mcap")["force"][-1][2]
+            self.assertLess(abs(force / 40.68 - 1.0), 0.03, element)  # of a mesh of tet10 with nodes every 0.4 mm, touched at its nodes; the mesh's own is 3.5 times that
+            self.assertEqual(json.loads((self.folder / "report.json").read_text())["status_ticks"]["capacity_full"], 0)

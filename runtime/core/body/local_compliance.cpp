@@ -59,9 +59,10 @@ Mat3 block(const Point& a, const Point& b, double nu) noexcept {
 template <Beside beside>
 void add_rows(const Point& a, double part, double nu, const LocalPoints& loaded, Index count,
               double* rows) noexcept {
-  std::array<const double*, LocalPoints::components> of{};
-  for (std::size_t k = 0; k < of.size(); ++k) of[k] = loaded[static_cast<Index>(k)];
-  const auto& [x, y, z, u, v, w, share_x, share_y, share_z, reach, disc, t, image, t_too, image_too] = of;
+  const double *x = loaded[0], *y = loaded[1], *z = loaded[2], *u = loaded[3], *v = loaded[4], *w = loaded[5],
+               *share_x = loaded[6], *share_y = loaded[7], *share_z = loaded[8], *reach = loaded[9],
+               *disc = loaded[10], *t = loaded[11], *image = loaded[12], *t_too = loaded[13],
+               *image_too = loaded[14];
   const half_space::Numbers of_a = numbers_of(a);
   const double ax = part * a.share.x(), ay = part * a.share.y(), az = part * a.share.z();
   double *row_x = rows, *row_y = rows + std::ptrdiff_t{3} * count, *row_z = rows + std::ptrdiff_t{6} * count;

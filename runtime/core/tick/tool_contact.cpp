@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "runtime/core/solve/tick_tuning.h"
 #include "runtime/core/touch/contact_feature.h"
@@ -259,21 +260,26 @@ bool is_done(const DetectionScratch& detection, const ToolContact& touch, const 
          is_found(detection, touch, tree, node);
 }
 
-/// Adds all corners as contact points below a segment, disc or large sphere, and for segment and disc the
+/// Parts of a simplex that are contact points beside its nearest point: corners seen from the core's origin
+/// or from all of it, and edges.
+enum class Parts : std::uint8_t { corners, corners_of_core, corners_and_edges };
+
+/// Adds all corners as contact points below a segment, disc or large sphere, and for disc and segment the
 /// edges: relative to a flat surface the single nearest point would switch between sides.
 void touch_corners(const ElasticBody& body, State& state, Scratch& scratch, const ToolContact& touch,
-                   const TouchingPair& seen, bool is_extended) noexcept {
+                   const TouchingPair& seen, Parts parts) noexcept {
   const SurfaceTree& tree = state.surface.tree;
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
   const double reach = state.tools[touch.number].tool.radius + touch.margin;
   for (std::size_t n = 0; n < corners; ++n) {
-    const int place = is_extended ? 2 : 0;
-    if (!is_extended && seen_from_outside && is_done(scratch.detection, touch, tree, reach, nodes[n]))
+    const int place = parts == Parts::corners ? 0 : 2;
+    if (parts == Parts::corners && seen_from_outside &&
+        is_done(scratch.detection, touch, tree, reach, nodes[n]))
       continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
-    if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
+    if (parts == Parts::corners_and_edges && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }
 }
 
@@ -294,7 +300,14 @@ void touch_chord(const ElasticBody& body, State& state, Scratch& scratch, const 
     return;
   TouchingPair pair = nearest;
   find_height(tree, nodes, pair);
-  touch_corners(body, state, scratch, touch, pair, false);
+  touch_corners(body, state, scratch, touch, pair, Parts::corners);
+}
+
+/// True if a capsule needs no more of a simplex than its corners: the simplex is a small part of a fine
+/// surface (LocalCompliance).
+bool is_smooth_for(const ElasticBody& body, const Tool& tool, Index simplex) noexcept {
+  return body.local() != nullptr &&
+         tool.radius > tuning.detection.smooth_radius * body.simplex_edges()[simplex];
 }
 
 }  // namespace
@@ -308,6 +321,8 @@ void touch_simplex(const ElasticBody& body, State& state, Scratch& scratch, cons
   TouchingPair pair = nearest;
   const bool is_disc = touch.core.disc_radius > 0.0;
   const bool is_extended = !has_point_core(tool);
+  if (is_extended && !is_disc && !touch.inside && is_smooth_for(body, tool, simplex))
+    return touch_corners(body, state, scratch, touch, pair, Parts::corners_of_core);
   // The centre of a disc is no special point, except when it has to be pushed out.
   if (!is_disc || touch.inside) touch_pair(body, state, scratch, touch, pair);
   if (is_extended) {
@@ -317,7 +332,7 @@ void touch_simplex(const ElasticBody& body, State& state, Scratch& scratch, cons
   }
   const bool is_flat = is_extended || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;
-  touch_corners(body, state, scratch, touch, pair, is_extended);
+  touch_corners(body, state, scratch, touch, pair, is_extended ? Parts::corners_and_edges : Parts::corners);
   if (is_disc) touch_rim(body, state, scratch, touch, simplex);
 }
 
