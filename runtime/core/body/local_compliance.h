@@ -20,10 +20,11 @@ class LocalPoints;
 ///
 ///   W_ij = N_i (Xi - D) N_j^T + B(x_i - x_j).
 ///
-/// B is the half-space's compliance, faded out within four edges. D is what Xi has in its place: the same B
-/// between nodes, and at a node and beside it all but the mean of Xi - B at the ring of nodes around these,
-/// where the mesh is right. So W no longer depends on the mesh, nor on the place within it
-/// (docs/theory-contact.md). Const once made; any number of threads may use it.
+/// B is the half-space's compliance, with the images of the force in sharp edges of the body, faded out
+/// within four edges. D is what Xi has in its place: the same B between nodes, and at a node and beside it
+/// all but the mean of Xi - B at the ring of nodes around these, where the mesh is right. So W no longer
+/// depends on the mesh, nor on the place within it (docs/theory-contact.md). Const once made; any number of
+/// threads may use it.
 class LocalCompliance {
  public:
   /// For a body in space of Young's modulus E [Pa] and Poisson's ratio nu, whose own triangles are `mesh` [3
