@@ -200,5 +200,5 @@ class Edge(ProgramTest):
             done(RUNTIME, "play", self.block(element, cells), "--device", f"script:{script}", "--tool", "capsule:0.004,0.008", "--friction", "0", "--depth", "no", "--fast",
                          "--record", self.folder / "run.mcap", "--report", self.folder / "report.json", "--force")
             force = -1e3 * palpate.read(self.folder / "run.mcap")["force"][-1][2]
-            self.assertLess(abs(force / 40.68 - 1.0), 0.03, element)  # of a mesh of tet10 with nodes every 0.4 mm, touched at its nodes; the mesh's own is 3.5 times that
+            self.assertLess(abs(force / 40.68 - 1.0), 0.03, element)  # a mesh with nodes every 0.4 mm (docs/measurements/overlays.md); its own mesh has 3.5 times that
             self.assertEqual(json.loads((self.folder / "report.json").read_text())["status_ticks"]["capacity_full"], 0)

@@ -3,9 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <functional>
 #include <queue>
 #include <tuple>
+#include <utility>
+
+#include "runtime/core/solve/nearest_point.h"
 
 namespace palpate {
 namespace {
@@ -83,9 +86,8 @@ class Spreading {
   }
 
   [[nodiscard]] double distance_to(std::size_t edge, const Vec3& x) const noexcept {
-    const Vec3 &a = nodes_[edges_[edge].ends[0]], &b = nodes_[edges_[edge].ends[1]];
-    const double share = (x - a).dot(b - a) / (b - a).squaredNorm();
-    return (a + std::clamp(share, 0.0, 1.0) * (b - a) - x).norm();
+    const auto [a, b] = edges_[edge].ends;
+    return std::sqrt(nearest_on_line(x, nodes_[a], nodes_[b]).squared_distance);
   }
 
   /// True if the edge is new to the node and not parallel to one that is nearer.

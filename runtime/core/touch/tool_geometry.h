@@ -28,7 +28,7 @@ inline bool has_point_core(const Tool& tool) noexcept {
 /// True for spheres, and for capsules that are no longer than two radii: 256 contact points are enough for
 /// these on a surface with a node every fifth of the radius.
 inline bool is_compact(const Tool& tool) noexcept {
-  return tool.disc_radius == 0.0 && tool.length <= 2.0 * tool.radius;
+  return tool.disc_radius <= tool.radius && tool.length <= 2.0 * tool.radius;
 }
 
 /// Distance from its origin to the farthest point of a tool [m].
