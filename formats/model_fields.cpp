@@ -93,7 +93,7 @@ std::string text_of(Precision precision) {
 ElementType element_from(const std::string& text) {
   for (const ElementType element : body_elements)
     if (text == text_of(element)) return element;
-  throw Unreadable{"is '" + text + "', not tri3, quad4, tet4, tet10 or hex8"};
+  throw Unreadable{"is '" + text + "', not tri3, quad4, tet4, tet4a, tet10 or hex8"};
 }
 
 void expect_dimension(const Model& model, std::int64_t dimension) {

@@ -85,6 +85,7 @@ std::vector<QuadraturePoint> make_rule(ElementType type) {
     case ElementType::tri6:
       return triangle_rule();
     case ElementType::tet4:
+    case ElementType::tet4a:
       return {{{0.25, 0.25, 0.25}, 1.0 / 6.0}};
     case ElementType::tet10:
       return tet_rule();
@@ -126,7 +127,7 @@ std::vector<QuadraturePoint> make_mass_rule(ElementType type) {
   if (type == ElementType::tri3) {
     for (const Vec3& xi : {Vec3(0.5, 0.0, 0.0), Vec3(0.5, 0.5, 0.0), Vec3(0.0, 0.5, 0.0)})
       rule.push_back({xi, 1.0 / 6.0});
-  } else if (type == ElementType::tet4) {
+  } else if (type == ElementType::tet4 || type == ElementType::tet4a) {
     add_orbit(rule, (5.0 - std::sqrt(5.0)) / 20.0, 1.0 / 24.0, false);
   } else if (type == ElementType::tet10) {
     add_orbit(rule, 0.09273525031089123, 0.01224884051939366, false);

@@ -6,10 +6,11 @@
 
 namespace palpate {
 
-/// Elements of bodies (tri3 and quad4 in the plane; tet4, tet10 and hex8 in space) and of their boundaries
-/// (line2; tri3, tri6 and quad4). Nodes are numbered as VTK numbers them: corners first, in a positive sense;
-/// then the middles of the edges (tri6: 01 12 20; tet10: 01 12 20 03 13 23).
-enum class ElementType : std::uint8_t { line2, tri3, tri6, quad4, tet4, tet10, hex8 };
+/// Elements of bodies (tri3 and quad4 in the plane; tet4, tet4a, tet10 and hex8 in space) and of their
+/// boundaries (line2; tri3, tri6 and quad4). Nodes are numbered as VTK numbers them: corners first, in a
+/// positive sense; then the middles of the edges (tri6: 01 12 20; tet10: 01 12 20 03 13 23). tet4a is tet4
+/// whose strain is averaged over edges and nodes (averaged_strain.h).
+enum class ElementType : std::uint8_t { line2, tri3, tri6, quad4, tet4, tet10, hex8, tet4a };
 
 /// Constants of a kind of element.
 struct ElementTraits {
@@ -24,7 +25,7 @@ struct ElementTraits {
   std::uint8_t vtk;   ///< VTK cell type
 };
 
-inline constexpr std::array<ElementTraits, 7> element_traits = {{
+inline constexpr std::array<ElementTraits, 8> element_traits = {{
     {ElementType::line2, "line2", 1, 2, 2, 1, 0, ElementType::line2, 3},
     {ElementType::tri3, "tri3", 2, 3, 3, 3, 3, ElementType::line2, 5},
     {ElementType::tri6, "tri6", 2, 6, 3, 3, 0, ElementType::line2, 22},
@@ -32,11 +33,13 @@ inline constexpr std::array<ElementTraits, 7> element_traits = {{
     {ElementType::tet4, "tet4", 3, 4, 4, 6, 4, ElementType::tri3, 10},
     {ElementType::tet10, "tet10", 3, 10, 4, 6, 4, ElementType::tri6, 24},
     {ElementType::hex8, "hex8", 3, 8, 8, 12, 6, ElementType::quad4, 12},
+    {ElementType::tet4a, "tet4a", 3, 4, 4, 6, 4, ElementType::tri3, 10},
 }};
 
 /// Kinds of elements that bodies are made of.
-inline constexpr std::array<ElementType, 5> body_elements = {
-    ElementType::tri3, ElementType::quad4, ElementType::tet4, ElementType::tet10, ElementType::hex8};
+inline constexpr std::array<ElementType, 6> body_elements = {ElementType::tri3,  ElementType::quad4,
+                                                             ElementType::tet4,  ElementType::tet4a,
+                                                             ElementType::tet10, ElementType::hex8};
 
 constexpr const ElementTraits& traits(ElementType type) noexcept {
   return element_traits[static_cast<std::size_t>(type)];

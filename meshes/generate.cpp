@@ -158,11 +158,12 @@ std::vector<Index> without_middles(const std::vector<Index>& connectivity, Eleme
 }  // namespace
 
 Mesh generate(const BoxShape& shape, ElementType element) {
-  if (element != ElementType::tet4 && element != ElementType::hex8) {
+  if (element != ElementType::tet4 && element != ElementType::tet4a && element != ElementType::hex8) {
     throw wrong_kind(ElementType::tet4, element, "box");
   }
   Mesh mesh =
       element == ElementType::hex8 ? hex_grid(shape.cells) : kuhn_grid(shape.cells, {false, false, false});
+  mesh.element = element;
   const Vec3 cells(shape.cells[0], shape.cells[1], shape.cells[2]);
   for (Vec3& x : mesh.nodes) {
     x = shape.origin + shape.size.cwiseProduct(x + 0.5 * cells).cwiseQuotient(cells);
@@ -219,12 +220,18 @@ Mesh generate(const SphereShape& shape) {
 }
 
 Mesh with_elements(Mesh mesh, ElementType element, const std::string& where) {
-  if (mesh.element == element) return mesh;
-  if (mesh.element == ElementType::tet4 && element == ElementType::tet10) {
+  const auto is_linear = [](ElementType type) {
+    return type == ElementType::tet4 || type == ElementType::tet4a;
+  };
+  if (mesh.element == element || (is_linear(mesh.element) && is_linear(element))) {
+    mesh.element = element;
+    return mesh;
+  }
+  if (is_linear(mesh.element) && element == ElementType::tet10) {
     MiddleNodes middles;
     mesh.connectivity = with_middles(mesh.connectivity, ElementType::tet4, middles, mesh.nodes);
     mesh.tagged_facets = with_middles(mesh.tagged_facets, ElementType::tri3, middles, mesh.nodes);
-  } else if (mesh.element == ElementType::tet10 && element == ElementType::tet4) {
+  } else if (mesh.element == ElementType::tet10 && is_linear(element)) {
     mesh.connectivity = without_middles(mesh.connectivity, ElementType::tet10);
     mesh.tagged_facets = without_middles(mesh.tagged_facets, ElementType::tri6);
     mesh.element = ElementType::tet4;

@@ -35,7 +35,7 @@ struct SphereShape {
   int cells_across = 4;  ///< cells over the diameter, even
 };
 
-/// Mesh of a box. `element`: tet4 (six Kuhn tetrahedra per cell, Freudenthal) or hex8.
+/// Mesh of a box. `element`: tet4 or tet4a (six Kuhn tetrahedra per cell, Freudenthal) or hex8.
 Mesh generate(const BoxShape& shape, ElementType element = ElementType::tet4);
 /// Mesh of a rectangle. `element`: quad4, or tri3 (each cell cut along its rising diagonal).
 Mesh generate(const RectangleShape& shape, ElementType element = ElementType::quad4);
@@ -43,9 +43,9 @@ Mesh generate(const CylinderShape& shape);  ///< a square grid bent to the circl
 Mesh generate(const SphereShape& shape);    ///< a cubic grid bent to the sphere, Kuhn tetrahedra
 
 /// Mesh of the same body with elements of another kind: tet4 becomes tet10 by a new node in the middle of
-/// each edge (numbered after the old ones; straight edges), tet10 becomes tet4 without its middle nodes, a
-/// mesh of that kind is returned unchanged. Tagged facets are converted too. Throws Error (where = `where`)
-/// for any other pair, naming the mesh's kind.
+/// each edge (numbered after the old ones; straight edges), tet10 becomes tet4 without its middle nodes,
+/// tet4a is tet4 by its nodes, a mesh of that kind is returned unchanged. Tagged facets are converted too.
+/// Throws Error (where = `where`) for any other pair, naming the mesh's kind.
 Mesh with_elements(Mesh mesh, ElementType element, const std::string& where);
 
 }  // namespace palpate

@@ -35,6 +35,7 @@ std::span<const SideNodes> element_sides(ElementType type) {
     case ElementType::quad4:
       return quad_sides;
     case ElementType::tet4:
+    case ElementType::tet4a:
     case ElementType::tet10:
       return tet_sides;
     case ElementType::hex8:
@@ -56,6 +57,7 @@ std::span<const EdgeNodes> element_edges(ElementType type) {
     case ElementType::quad4:
       return quad_edges;
     case ElementType::tet4:
+    case ElementType::tet4a:
     case ElementType::tet10:
       return tet_edges;
     case ElementType::hex8:
@@ -75,6 +77,7 @@ std::span<const std::uint8_t> reversed_nodes(ElementType type) {
     case ElementType::quad4:
       return reversed_quad;
     case ElementType::tet4:
+    case ElementType::tet4a:
       return std::span(reversed_tet).first(4);
     case ElementType::tet10:
       return reversed_tet;

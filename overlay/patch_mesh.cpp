@@ -239,6 +239,12 @@ Eigen::MatrixXd patch_stiffness(const Model& model, const PatchMesh& patch) {
   return K;
 }
 
+void check_for_overlays(const Model& model, const std::string& where) {
+  if (model.mesh.element != ElementType::tet4a) return;
+  throw Error("an overlay replaces the stiffness of elements, and that of tet4a is of several together",
+              where, "set element = \"tet10\" (or \"tet4\", which locks) in [mesh]");
+}
+
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,
                           std::vector<Index> elements) {
   std::sort(elements.begin(), elements.end());

@@ -4,6 +4,7 @@
 #include <Eigen/SparseCore>
 #include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "formats/model.h"
@@ -32,6 +33,10 @@ std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std:
 
 /// Nodes of some elements, without duplicates, ascending.
 std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements);
+
+/// Throws Error (where = `where`) for a body of tet4a, whose stiffness is no sum over elements that an
+/// overlay could replace.
+void check_for_overlays(const Model& model, const std::string& where);
 
 /// A side of a patch element that no other patch element has.
 struct OuterSide {

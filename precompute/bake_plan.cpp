@@ -135,8 +135,8 @@ void announce_locking(const BakeRun& run, const Model& model) {
   if (model.mesh.element != ElementType::tet4 || nu <= 0.4) return;
   run.progress.line(
       fmt::format("note: tet4 at Poisson's ratio {} is too stiff to a touch, by 13 to 24 % at 0.45 "
-                  "and by more above: element = \"tet10\" in [mesh], with twice the "
-                  "edge_length, is truer (docs/elements.md)",
+                  "and by more above: element = \"tet4a\" in [mesh] is truer "
+                  "(docs/elements.md)",
                   nu));
 }
 

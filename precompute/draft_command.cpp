@@ -76,9 +76,9 @@ void add_draft_options(CLI::App& app, DraftArguments& arguments) {
       ->check(CLI::IsMember({"largest", "all"}))
       ->group(group);
   app.add_option("--element", arguments.element,
-                 "elements of a description that is written, for a surface or an image; default: tet4")
-      ->option_text("tet4|tet10")
-      ->check(CLI::IsMember({"tet4", "tet10"}))
+                 "elements of a description that is written, for a surface or an image; default: tet4a")
+      ->option_text("tet4a|tet10")
+      ->check(CLI::IsMember({"tet4a", "tet10"}))
       ->group(group);
   app.add_option("--range", arguments.range,
                  "values of an image that are body, for a grey image (CT, MR) in place of labels")

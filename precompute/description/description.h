@@ -59,8 +59,8 @@ enum class Mesher : std::uint8_t { tetgen, cgal };
 
 /// Options for meshing. Lengths in metres after scaling.
 struct MeshOptions {
-  /// Kind of the elements; empty: the default of the geometry (tet4; quad4 for rectangles; tri3 for polygons
-  /// and pictures; for volume meshes the file's).
+  /// Kind of the elements; by default tet4a; quad4 for rectangles; tri3 for polygons and pictures; empty: a
+  /// volume mesh's own.
   std::optional<ElementType> element;
   Mesher mesher = Mesher::tetgen;  ///< for surfaces and images; images: cgal by default
   bool mesher_chosen = false;      ///< named in model.toml: no other mesher replaces it

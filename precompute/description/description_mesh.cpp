@@ -58,15 +58,15 @@ void read_optimize(const TomlTable& mesh, std::string_view kind, MeshOptions& op
 
 Keys elements_of(std::string_view kind) {
   if (kind == "volume") {
-    return {"tri3", "quad4", "tet4", "tet10", "hex8"};
+    return {"tri3", "quad4", "tet4", "tet4a", "tet10", "hex8"};
   }
   if (kind == "box") {
-    return {"tet4", "tet10", "hex8"};
+    return {"tet4a", "tet4", "tet10", "hex8"};
   }
   if (kind == "rectangle") {
     return {"quad4", "tri3"};
   }
-  return is_plane(kind) ? Keys{"tri3"} : Keys{"tet4", "tet10"};
+  return is_plane(kind) ? Keys{"tri3"} : Keys{"tet4a", "tet4", "tet10"};
 }
 
 Keys meshers_of(std::string_view kind) {
@@ -113,6 +113,8 @@ MeshOptions read_mesh_options(const TomlTable& mesh, std::string_view kind) {
                 "use " + quoted_choice(elements_of(kind)));
     }
     options.element = element_named(name);
+  } else if (kind != "volume") {
+    options.element = element_named(elements_of(kind).front());
   }
   options.remesh = mesh.boolean("remesh", options.remesh);
   if (mesh.has("edge_length")) {

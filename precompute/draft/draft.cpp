@@ -249,18 +249,16 @@ std::string draft_text(const std::filesystem::path& description, const std::file
       "many\n",
       edge_length(shape, unit, options), nodes, is_picture ? "outline" : "surface",
       is_picture ? "two" : "four");
-  if (options.tet10 && !is_picture) text += "element = \"tet10\"  # of second order: it does not lock\n";
+  if (options.tet10 && !is_picture) text += "element = \"tet10\"  # of second order\n";
   if (is_surface)
     text += shape.remesh ? "remesh = true\n"
                          : "remesh = false  # the triangles of the surface are of that size\n";
   if (is_picture) return text + picture_text(values);
   text += fmt::format(
       "\n[material]\nyoungs_modulus = {}  # pascals: soft tissue, about that of healthy liver\n"
-      "poissons_ratio = {}  # below 0.5{}\n"
+      "poissons_ratio = {}  # below 0.5\n"
       "density = {}  # kg/m^3\nfriction = {}  # between the surface and a tool: wet tissue\n",
-      values.youngs_modulus, values.poissons_ratio,
-      options.tet10 ? "" : "; from 0.47 on add element = \"tet10\" to [mesh]", values.density,
-      values.friction);
+      values.youngs_modulus, values.poissons_ratio, values.density, values.friction);
   text += fmt::format(
       "\n[[fixed]]  # what is held: as if the body lay on a table\nlowest = {{axis = \"{}\", percent = "
       "{}}}\n",

@@ -29,7 +29,7 @@ struct DraftOptions {
   ShapeOptions shape{};
   std::optional<LengthUnit> unit{};     ///< empty: guessed
   bool renew = false;                   ///< an existing description is replaced
-  bool tet10 = false;                   ///< second-order elements, else tet4; pictures have tri3
+  bool tet10 = false;                   ///< second-order elements, else tet4a; pictures have tri3
   std::filesystem::path elsewhere{};    ///< folder for files that the shape's own folder cannot hold
   bool keep = false;                    ///< no existing file is replaced
   std::optional<DraftValues> values{};  ///< empty: defaults of the kind

@@ -1,13 +1,13 @@
 #include "precompute/numerics/assembly.h"
 
 #include <algorithm>
+#include <functional>
 
+#include "meshes/averaged_strain.h"
 #include "meshes/element.h"
 
 namespace palpate {
 namespace {
-
-constexpr std::size_t max_element_dofs = std::size_t{3} * max_element_nodes;
 
 /// Numbers the free dofs, keeping those of a node together.
 void number_dofs(const StiffnessInput& body, Stiffness& result) {
@@ -26,7 +26,7 @@ void number_dofs(const StiffnessInput& body, Stiffness& result) {
   result.node_start.push_back(static_cast<std::int64_t>(result.free_dofs.size()));
 }
 
-/// For each free node the free nodes with a higher number that have an element in common with it, ascending.
+/// For each free node the free nodes with a higher number that are coupled with it, ascending.
 struct UpperNeighbours {
   std::vector<std::int64_t> start;  ///< [nodes + 1]
   std::vector<Index> node;
@@ -42,11 +42,22 @@ std::vector<Index> free_nodes(const StiffnessInput& body, const Stiffness& stiff
   return result;
 }
 
-/// Calls f(a, b) for every two free nodes a < b of each element.
+/// Visits the nodes of each element or, of tet4a, of each strain domain of a node, in which those of edges
+/// are.
+void for_each_coupled(const StiffnessInput& body, const std::function<void(std::span<const Index>)>& visit) {
+  if (body.mesh.element == ElementType::tet4a) {
+    for_each_strain_domain(body.mesh, body.material_of_element, [&](const StrainDomain& domain) {
+      if (!domain.is_of_edge) visit(domain.nodes);
+    });
+    return;
+  }
+  for (Index e = 0; e < body.mesh.elements(); ++e) visit(body.mesh.element_nodes(e));
+}
+
+/// Calls f(a, b) for every two free nodes a < b of those that are coupled.
 template <class F>
-void for_each_free_pair(const Mesh& mesh, const std::vector<Index>& free_node, F f) {
-  for (Index e = 0; e < mesh.elements(); ++e) {
-    const std::span<const Index> nodes = mesh.element_nodes(e);
+void for_each_free_pair(const StiffnessInput& body, const std::vector<Index>& free_node, F f) {
+  for_each_coupled(body, [&](std::span<const Index> nodes) {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const Index a = free_node[static_cast<std::size_t>(nodes[i])];
       for (std::size_t j = i + 1; j < nodes.size(); ++j) {
@@ -54,17 +65,17 @@ void for_each_free_pair(const Mesh& mesh, const std::vector<Index>& free_node, F
         if (a >= 0 && b >= 0) f(std::min(a, b), std::max(a, b));
       }
     }
-  }
+  });
 }
 
-UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>& free_node,
+UpperNeighbours find_upper_neighbours(const StiffnessInput& body, const std::vector<Index>& free_node,
                                       std::size_t nodes) {
   std::vector<std::int64_t> start(nodes + 1, 0);
-  for_each_free_pair(mesh, free_node, [&](Index a, Index) { ++start[static_cast<std::size_t>(a) + 1]; });
+  for_each_free_pair(body, free_node, [&](Index a, Index) { ++start[static_cast<std::size_t>(a) + 1]; });
   for (std::size_t a = 0; a < nodes; ++a) start[a + 1] += start[a];
   std::vector<Index> node(static_cast<std::size_t>(start[nodes]));
   std::vector<std::int64_t> next(start.begin(), start.end() - 1);
-  for_each_free_pair(mesh, free_node, [&](Index a, Index b) {
+  for_each_free_pair(body, free_node, [&](Index a, Index b) {
     node[static_cast<std::size_t>(next[static_cast<std::size_t>(a)]++)] = b;
   });
 
@@ -101,13 +112,12 @@ SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::i
   return K;
 }
 
-/// Adds K_e: entries between free dofs to K, those between free and held dofs times the prescribed
-/// displacement to the held force.
-void scatter(const StiffnessInput& body, std::span<const Index> nodes, const ElementMatrix& Ke,
-             Stiffness& result) {
+/// Adds the stiffness of some nodes: entries between free dofs to K, those between free and held dofs times
+/// the prescribed displacement to the held force.
+void scatter(const StiffnessInput& body, std::span<const Index> nodes, const auto& Ke, Stiffness& result) {
   const int d = body.mesh.dimension();
-  std::array<std::int64_t, max_element_dofs> free{};
-  std::array<double, max_element_dofs> prescribed{};
+  std::vector<std::int64_t> free(static_cast<std::size_t>(Ke.cols()));
+  std::vector<double> prescribed(free.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (int axis = 0; axis < d; ++axis) {
       const std::size_t local = static_cast<std::size_t>(d) * i + static_cast<std::size_t>(axis);
@@ -146,8 +156,15 @@ Stiffness assemble_stiffness(const StiffnessInput& body) {
   number_dofs(body, result);
   result.held_force.assign(result.free_dofs.size(), 0.0);
   const UpperNeighbours upper =
-      find_upper_neighbours(body.mesh, free_nodes(body, result), result.node_start.size() - 1);
+      find_upper_neighbours(body, free_nodes(body, result), result.node_start.size() - 1);
   result.K = make_pattern(upper, result.node_start);
+  if (body.mesh.element == ElementType::tet4a) {
+    for_each_strain_domain(body.mesh, body.material_of_element, [&](const StrainDomain& domain) {
+      const Material& material = body.materials[static_cast<std::size_t>(domain.material)];
+      scatter(body, domain.nodes, domain_stiffness(domain, material), result);
+    });
+    return result;
+  }
 
   std::vector<ElasticityMatrix> D;
   for (const Material& material : body.materials) D.push_back(elasticity_matrix(material, body.analysis));

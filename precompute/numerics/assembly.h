@@ -36,7 +36,8 @@ struct StiffnessInput {
 /// StiffnessInput of a baked model.
 StiffnessInput stiffness_input(const Model& model);
 
-/// K = sum over elements of the integral of t B^T D B (theory.md section 1). At least one dof must be free.
+/// K = sum over elements, of tet4a over its strain domains, of the integral of t B^T D B (theory.md section
+/// 1). At least one dof must be free.
 Stiffness assemble_stiffness(const StiffnessInput& body);
 
 /// M = sum over elements of the integral of t density N^T N [kg], of the free dofs, in K's pattern, the lower

@@ -147,7 +147,7 @@ struct MeshGeometry {
   void begin_generating(ElementType usual, double cells) const {
     progress("generating the mesh");
     const ElementType element = options.element.value_or(usual);
-    const bool is_cut = element == ElementType::tet4 || element == ElementType::tet10;
+    const bool is_cut = traits(element).corners == 4 && traits(element).dimension == 3;
     check_mesh_room(cells * (is_cut ? 6.0 : element == ElementType::tri3 ? 2.0 : 1.0), element, where);
   }
 

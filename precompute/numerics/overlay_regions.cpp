@@ -58,6 +58,7 @@ std::vector<Index> centres_in(const Model& model, const OverlayRegions& overlay,
 }  // namespace
 
 OverlayPlan plan_overlays(const Model& model, const OverlayRegions& overlay, const std::string& file) {
+  check_for_overlays(model, file + ": [overlay]");
   OverlayPlan plan;
   plan.centres = centres_in(model, overlay, file);
   const ElementsAtNodes at(model.mesh);

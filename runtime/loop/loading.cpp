@@ -18,6 +18,7 @@
 #include "formats/model_check.h"
 #include "formats/model_file.h"
 #include "matrices/hierarchical.h"
+#include "overlay/patch_mesh.h"
 #include "runtime/body/scaled_model.h"
 #include "runtime/depth/deep_body.h"
 #include "runtime/live/live_model.h"
@@ -111,6 +112,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
   if (options.depth == Depth::yes) check_depth(options);
+  if (options.has_overlays()) check_for_overlays(model, "--overlay");
   if (options.overlay_law != PatchLaw::linear) prepare_for_law(model, options);
   if (options.live.solver) {
     if (options.has_overlays()) {

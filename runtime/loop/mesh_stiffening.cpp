@@ -10,6 +10,8 @@ double factor_of(ElementType element) noexcept {
   switch (element) {
     case ElementType::tet4:
       return 1.1;
+    case ElementType::tet4a:
+      return 0.67;
     case ElementType::tet10:
       return 0.98;
     case ElementType::hex8:

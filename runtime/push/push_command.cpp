@@ -58,8 +58,8 @@ CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
                 "guessed");
   add_handed_on(*push, arguments, "surface-nodes", "N",
                 "about how many nodes its surface has; default: 4000; on the outline of a picture's body 60");
-  add_handed_on(*push, arguments, "element", "tet4|tet10",
-                "elements of a surface or an image, in a description that is written; default: tet10");
+  add_handed_on(*push, arguments, "element", "tet4a|tet10",
+                "elements of a surface or an image, in a description that is written; default: tet4a");
   add_handed_on(*push, arguments, "range", "LOW:HIGH",
                 "values of an image that are body, for a grey image (CT, MR) in place of labels");
   add_handed_on(*push, arguments, "parts", "largest|all", "which of several parts are the body");
@@ -88,8 +88,6 @@ bool is_baked(const PushArguments& arguments) {
 Baked bake_first(const PushArguments& arguments) {
   std::vector<std::string> words = {"--unless-done", "--report", "-"};
   words.insert(words.end(), arguments.for_precompute.begin(), arguments.for_precompute.end());
-  const bool has_element = std::ranges::find(words, "--element") != words.end();
-  if (!has_element && !arguments.file.ends_with(".toml")) words.insert(words.end(), {"--element", "tet10"});
   words.insert(words.end(), {"--", arguments.file});
   const ProgramEnd end = run_other_program(find_program("palpate-precompute"), words);
   if (end.status != exit_ok) return {.status = end.status, .file = ""};

@@ -388,7 +388,7 @@ const Edit edits[] = {
      {"attribute element is missing"}},
     {"UnknownElement",
      [](const Path& p) { set_text(p, "element", "wedge6"); },
-     {"attribute element is 'wedge6', not tri3, quad4, tet4, tet10 or hex8"}},
+     {"attribute element is 'wedge6', not tri3, quad4, tet4, tet4a, tet10 or hex8"}},
     {"ElementOfTheBoundary",
      [](const Path& p) { set_text(p, "element", "tri6"); },
      {"attribute element is 'tri6'"}},

@@ -124,7 +124,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
         for line, wanted in (
                 ("palpate-runtime pl", ["play"]), ("palpate-runtime ", ["devices", "export", "help", "play", "probe", "push", "samples", "session", "view"]),
                 ("palpate-runtime help s", ["samples", "session"]), ("palpate-runtime play ", ["cube.palpate.hdf", "deep"]),
-                ("palpate-precompute --element ", ["tet10", "tet4"]),
+                ("palpate-precompute --element ", ["tet10", "tet4a"]),
                 ("palpate-runtime play --contact ", ["dynamic", "quasi-static"]), ("palpate-runtime play --contact=d", ["dynamic"]),
                 ("palpate-runtime play --tool ", ["capsule:", "disc:", "point", "sphere:"]), ("palpate-runtime play --tool=s", ["sphere:"]),
                 ("palpate-runtime play --device s", ["script:"]), ("palpate-runtime play --device script:t", ["touch.csv"]),

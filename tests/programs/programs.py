@@ -83,11 +83,13 @@ def set_tick(recording, field, row, value):
     recording.write_bytes(data)
 
 
-def cube_toml(cells, scope="surface", precision="double", name="cube"):
+def cube_toml(cells, scope="surface", precision="double", name="cube", element="tet4"):
     """The cube of theory.md section 4 with `cells` cells an edge."""
     return f"""name = "{name}"
 [geometry]
 box = {{ origin = [0, 0, 0], size = [1, 1, 1], cells = [{cells}, {cells}, {cells}] }}
+[mesh]
+element = "{element}"
 [material]
 youngs_modulus = 1.0
 poissons_ratio = 0.3

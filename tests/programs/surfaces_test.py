@@ -37,12 +37,10 @@ class Bodies(ProgramTest):
         description = (self.folder / "open.model.toml").read_text()
         self.assertIn('surface = "open.repaired.off"', description)
         self.assertIn("scale = 0.001", description)
-        # The second route: the box by its measures, in hexahedra, with nothing read or repaired.
+        # The second route: the box by its measures, of regular cells, with nothing read or repaired.
         self.bake("""name = "box"
 [geometry]
-box = {size = [0.1, 0.1, 0.1], cells = [10, 10, 10]}
-[mesh]
-element = "hex8"
+box = {size = [0.1, 0.1, 0.1], cells = [8, 8, 8]}
 [material]
 youngs_modulus = 5000
 poissons_ratio = 0.45

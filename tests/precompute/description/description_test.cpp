@@ -36,7 +36,7 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(shape.cells, (std::array<int, 3>{2, 3, 4}));
   EXPECT_EQ(d.analysis, Analysis::solid);
   EXPECT_EQ(d.thickness, 1.0);
-  EXPECT_FALSE(d.mesh.element);
+  EXPECT_EQ(d.mesh.element, ElementType::tet4a);
   EXPECT_EQ(d.mesh.mesher, Mesher::tetgen);
   EXPECT_FALSE(d.mesh.edge_length);
   EXPECT_FALSE(d.mesh.remesh);

@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
 #include <random>
 
 #include "meshes/element.h"
@@ -52,6 +56,66 @@ TEST(Assembly, RigidMotionsTakeNoForce) {
   const Eigen::VectorXd eigenvalues = test::eigenvalues_of(K);
   EXPECT_LT(std::abs(eigenvalues[5]), 1e-10 * eigenvalues[eigenvalues.size() - 1]);
   EXPECT_GT(eigenvalues[6], 1e-5 * eigenvalues[eigenvalues.size() - 1]);
+}
+
+/// Energy of mu and of lambda up to 2 mu over edges and of the rest of lambda over nodes, of the strain
+/// averaged there over each material.
+double averaged_energy(const ElasticCase& body, const Eigen::VectorXd& u) {
+  struct Sum {
+    double volume = 0.0;
+    Mat3 strain = Mat3::Zero();
+  };
+  std::map<std::array<Index, 3>, Sum> edges, nodes;
+  for (Index e = 0; e < body.mesh.elements(); ++e) {
+    const std::span<const Index> of = body.mesh.element_nodes(e);
+    Mat3 sides, moved;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const Index node = of[static_cast<std::size_t>(k + 1)];
+      sides.col(k) =
+          body.mesh.nodes[static_cast<std::size_t>(node)] - body.mesh.nodes[static_cast<std::size_t>(of[0])];
+      moved.col(k) = u.segment<3>(3 * Eigen::Index{node}) - u.segment<3>(3 * Eigen::Index{of[0]});
+    }
+    const Mat3 slope = moved * sides.inverse(), strain = 0.5 * (slope + slope.transpose());
+    const double volume = sides.determinant() / 6.0;
+    const Index material = body.material_of_element[static_cast<std::size_t>(e)];
+    const auto add = [&](Sum& sum, double share) {
+      sum.volume += share * volume;
+      sum.strain += share * volume * strain;
+    };
+    for (std::size_t i = 0; i < 4; ++i) {
+      add(nodes[{material, of[i], of[i]}], 1.0 / 4.0);
+      for (std::size_t j = i + 1; j < 4; ++j)
+        add(edges[{material, std::min(of[i], of[j]), std::max(of[i], of[j])}], 1.0 / 6.0);
+    }
+  }
+  double energy = 0.0;
+  const auto add = [&](const auto& sums, bool is_of_edges) {
+    for (const auto& [key, sum] : sums) {
+      const Material& m = body.materials[static_cast<std::size_t>(key[0])];
+      const double mu = m.youngs_modulus / (2.0 + 2.0 * m.poissons_ratio),
+                   lambda = 2.0 * mu * m.poissons_ratio / (1.0 - 2.0 * m.poissons_ratio),
+                   of_edges = std::min(lambda, 2.0 * mu);
+      energy +=
+          0.5 * (is_of_edges ? of_edges : lambda - of_edges) * std::pow(sum.strain.trace(), 2) / sum.volume;
+      if (is_of_edges) energy += mu * sum.strain.squaredNorm() / sum.volume;
+    }
+  };
+  add(edges, true);
+  add(nodes, false);
+  return energy;
+}
+
+TEST(Assembly, OfTet4aIsTheEnergyOfAveragedStrain) {
+  ElasticCase body(with_elements(distorted_box(3), ElementType::tet4a, ""), rubber);
+  body.materials.push_back({4.0e5, 0.2, 1000.0});
+  for (std::size_t e = 0; e < body.material_of_element.size(); e += 3) body.material_of_element[e] = 1;
+  const Eigen::MatrixXd K = dense(assemble_stiffness(body.body()).K);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < 10; ++k) {
+    const Eigen::VectorXd u = Eigen::VectorXd::NullaryExpr(K.rows(), [&] { return normal(random); });
+    EXPECT_NEAR(0.5 * u.dot(K * u), averaged_energy(body, u), 1e-12 * averaged_energy(body, u));
+  }
 }
 
 TEST(Assembly, ClampingThreeNodesMakesItPositiveDefinite) {

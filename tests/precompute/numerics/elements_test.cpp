@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "meshes/element.h"
+#include "meshes/topology.h"
 #include "precompute/numerics/factor.h"
 #include "tests/support/bodies/precompute_case.h"
 #include "tests/support/bodies/precompute_kinds.h"
@@ -216,6 +217,35 @@ TEST_P(AssembledKind, ConvergesWithTheOrderOfItsShapeFunctions) {
   RecordProperty("order", std::to_string(std::log2(middle / fine)));
   EXPECT_NEAR(std::log2(middle / fine), quadratic ? 3.0 : 2.0, 0.15);
   EXPECT_NEAR(std::log2(coarse / middle), quadratic ? 3.0 : 2.0, 0.4);
+}
+
+// --- locking ---
+
+/// Displacement along a force on a quarter of the top of a cube that is held below, over the force [m/N].
+double given_way(ElementType element, double nu) {
+  ElasticCase cube(test::block(element, Vec3::Constant(0.1), {6, 6, 6}), {3.0e4, nu, 1000.0});
+  cube.hold([](const Vec3& x) { return x.z() < 1e-9; }, 7);
+  std::vector<Vec3> force(cube.mesh.nodes.size(), Vec3::Zero());
+  for (const ElementSide& side : boundary_sides(cube.mesh)) {
+    const std::vector<Index> nodes = side_nodes(cube.mesh, side);
+    const ElementNodes x = positions(cube.mesh, nodes);
+    if (x.col(2).minCoeff() < 0.0999 || x.leftCols(2).maxCoeff() > 0.0501) continue;
+    const ShapeValues area = facet_shape_integrals(traits(element).facet, x, 1.0);
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      force[static_cast<std::size_t>(nodes[k])].z() += area[static_cast<Eigen::Index>(k)] / (0.05 * 0.05);
+  }
+  const std::vector<Vec3> u = displacement(cube, force);
+  double work = 0.0;
+  for (std::size_t node = 0; node < u.size(); ++node) work += u[node].dot(force[node]);
+  return work;
+}
+
+TEST(Tet4a, DoesNotLock) {
+  for (const double nu : {0.3, 0.45, 0.49, 0.499}) {
+    const double right = given_way(ElementType::tet10, nu);
+    EXPECT_NEAR(given_way(ElementType::tet4a, nu) / right, 1.0, 0.025) << nu;
+    EXPECT_LT(given_way(ElementType::tet4, nu) / right, nu < 0.4 ? 0.95 : 0.9) << nu;
+  }
 }
 
 }  // namespace

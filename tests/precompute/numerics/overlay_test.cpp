@@ -22,6 +22,8 @@ namespace {
 const std::string block = R"(name = "block"
 [geometry]
 box = {size = [0.04, 0.04, 0.03], cells = [4, 4, 3]}
+[mesh]
+element = "tet4"
 [[material]]
 youngs_modulus = 5000
 poissons_ratio = 0.4

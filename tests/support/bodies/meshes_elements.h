@@ -29,6 +29,7 @@ inline std::vector<Vec3> vtk_nodes(ElementType type) {
     case ElementType::quad4:
       return {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     case ElementType::tet4:
+    case ElementType::tet4a:
       return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     case ElementType::tet10:
       return {{0, 0, 0},   {1, 0, 0},  {0, 1, 0},  {0, 0, 1},   {.5, 0, 0},
@@ -113,6 +114,7 @@ inline Shape known_shape(ElementType type) {
     case ElementType::tri6:
       return {x, area(0, 1, 2), mean};
     case ElementType::tet4:
+    case ElementType::tet4a:
     case ElementType::tet10:
       return {x, (node(1) - node(0)).cross(node(2) - node(0)).dot(node(3) - node(0)) / 6.0, mean};
     case ElementType::quad4: {

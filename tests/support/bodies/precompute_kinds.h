@@ -22,8 +22,8 @@ struct Kind {
 inline const std::vector<Kind> all_kinds = {
     {ElementType::tri3, Analysis::plane_stress},  {ElementType::tri3, Analysis::plane_strain},
     {ElementType::quad4, Analysis::plane_stress}, {ElementType::quad4, Analysis::plane_strain},
-    {ElementType::tet4, Analysis::solid},         {ElementType::tet10, Analysis::solid},
-    {ElementType::hex8, Analysis::solid}};
+    {ElementType::tet4, Analysis::solid},         {ElementType::tet4a, Analysis::solid},
+    {ElementType::tet10, Analysis::solid},        {ElementType::hex8, Analysis::solid}};
 
 inline std::string name_of(const testing::TestParamInfo<Kind>& info) {
   std::string name = traits(info.param.element).name;
@@ -44,7 +44,7 @@ Mesh block(ElementType element, const Vec3& size, const std::array<int, 3>& cell
                     element == ElementType::hex8 ? ElementType::hex8 : ElementType::tet4);
   }
   for (Vec3& x : mesh.nodes) x = move(x);
-  return element == ElementType::tet10 ? with_elements(std::move(mesh), element, "block") : mesh;
+  return with_elements(std::move(mesh), element, "block");
 }
 
 inline Mesh block(ElementType element, const Vec3& size, const std::array<int, 3>& cells) {
