@@ -180,8 +180,13 @@ void warn_of_places(const PlayedRun& run) {
 constexpr double most_residual = 1e-3;  // largest one that is not reported
 
 void print_depth(const DepthTelling& depth) {
-  say(stderr, "depth: the body turned by up to {:.3g} degrees, its compliance {} times\n",
+  say(stderr, "depth: the body turned by up to {:.3g} degrees, its compliance {} times",
       degrees_a_radian * depth.largest_rotation, depth.turns);
+  if (depth.largest_force > 0.0)
+    say(stderr, "; for its largest force of {:.3g} N small strain has {:.3g} % {}", depth.largest_force,
+        100.0 * std::abs(depth.small_strain_at_largest),
+        depth.small_strain_at_largest < 0.0 ? "less" : "more");
+  say(stderr, "\n");
   if (depth.last_residual > most_residual) {
     print_warning(fmt::format(
         "at the end the body was not in balance: its next step would have changed it by {:.2g} of "

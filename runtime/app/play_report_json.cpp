@@ -81,6 +81,8 @@ Json json_depth(const DepthTelling& depth) {
           {"last_rotation_deg", degrees_a_radian * depth.last_rotation},
           {"compliance_turns", depth.turns},
           {"steps_unbalanced", depth.unbalanced},
+          {"small_strain_at_largest_force", depth.small_strain_at_largest},
+          {"last_small_strain", depth.last_small_strain},
           {"last_residual", depth.last_residual}};
 }
 

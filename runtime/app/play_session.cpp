@@ -11,6 +11,7 @@
 #include "base/write_file.h"
 #include "runtime/app/play_report.h"
 #include "runtime/background/live_motion.h"
+#include "runtime/background/two_level_motion.h"
 #include "runtime/loop/last_tick.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/real_time.h"
@@ -163,6 +164,11 @@ LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   const RealTimeRights rights(options_.processor);
   if (!rights.refused().empty()) print_warning(rights.refused());
   return run_loop(parts, loop, stop);
+}
+
+std::optional<double> PlaySession::small_strain() const {
+  const auto* const deep = motion_ ? dynamic_cast<const TwoLevelMotion*>(&motion_->stepper()) : nullptr;
+  return deep != nullptr ? std::optional(deep->telling().last_small_strain) : std::nullopt;
 }
 
 void PlaySession::tell(const PlayedParts* parts) const {

@@ -51,6 +51,10 @@ class PlaySession {
   /// Reason if the recording of the finished run is incomplete; empty if it is complete, or there is none.
   [[nodiscard]] const std::optional<Error>& recording_failure() const noexcept { return recording_failure_; }
 
+  /// By which small strain has more force than the body on two levels now, as a fraction of it; empty for
+  /// other bodies. For any thread.
+  [[nodiscard]] std::optional<double> small_strain() const;
+
   /// Number of ticks missing from the recording.
   [[nodiscard]] std::int64_t dropped() const { return recorder_ ? recorder_->dropped() : 0; }
 

@@ -217,7 +217,13 @@ void ViewedPlay::show_body() {
 }
 
 LoopReport ViewedPlay::run_act(PlaySession& session, const std::atomic<bool>& stop) {
+  const auto set_playing = [this](const PlaySession* now) {
+    const std::lock_guard lock(mutex_);
+    playing_ = now;
+  };
+  set_playing(&session);
   const LoopReport& report = session.run(stop);
+  set_playing(nullptr);
   if (!session.recording_failure()) return report;
   recording_failed_ = true;
   if (stop) return report;
@@ -400,6 +406,7 @@ void ViewedPlay::take_change(const SurfaceFrame& frame) {
   const SurfaceChange change = surface_change(body_->dimension(), body_->drawn_simplices(), mesh, u);
   const std::lock_guard lock(mutex_);
   state_.change = change;
+  state_.small_strain = playing_ != nullptr ? playing_->small_strain() : std::nullopt;
 }
 
 void ViewedPlay::take_ticks(std::span<const TickNote> notes) {

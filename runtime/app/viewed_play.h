@@ -101,7 +101,8 @@ class ViewedPlay : public ViewedRun {
   mutable std::mutex mutex_;  // guards the following; the loop never locks it
   Plan requested_;            // next session
   RunState state_;
-  bool changed_ = true;  // since the last state sent to pages
+  const PlaySession* playing_ = nullptr;  // null: none
+  bool changed_ = true;                   // since the last state sent to pages
   std::condition_variable_any tell_;
 };
 

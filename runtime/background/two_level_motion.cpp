@@ -223,6 +223,17 @@ void TwoLevelMotion::tell(const TwoLevelReport& report) {
   telling_.largest_rotation = std::max(telling_.largest_rotation, turn);
   telling_.last_residual = report.residual;
   telling_.unbalanced += report.converged ? 0 : 1;
+  telling_.last_small_strain = 0.0;
+  if (!report.converged || levels_.loaded().empty()) return;
+  Vec3 sum = Vec3::Zero();
+  for (Index k = 0; k < std::ssize(levels_.loaded()); ++k)
+    sum += vector_at(levels_.forces(), body_.dimension(), k);
+  const double force = sum.norm();
+  if (force < least_error * telling_.largest_force || force == 0.0) return;
+  telling_.last_small_strain = report.small_strain.norm() / force - 1.0;
+  if (force <= telling_.largest_force) return;
+  telling_.largest_force = force;
+  telling_.small_strain_at_largest = telling_.last_small_strain;
 }
 
 }  // namespace palpate

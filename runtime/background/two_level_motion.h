@@ -13,11 +13,15 @@ namespace palpate {
 
 /// Statistics of a body on two levels.
 struct DepthTelling {
-  std::int64_t turns = 0;         ///< number of times that the tick's compliance was renewed
-  double largest_rotation = 0.0;  ///< rotation of the surface so far [rad]
-  double last_rotation = 0.0;     ///< present rotation of the surface [rad]
-  double last_residual = 0.0;     ///< TwoLevelReport::residual
-  std::int64_t unbalanced = 0;    ///< jobs that ended before balance was reached
+  std::int64_t turns = 0;                ///< number of times that the tick's compliance was renewed
+  double largest_rotation = 0.0;         ///< rotation of the surface so far [rad]
+  double last_rotation = 0.0;            ///< present rotation of the surface [rad]
+  double last_residual = 0.0;            ///< TwoLevelReport::residual
+  std::int64_t unbalanced = 0;           ///< jobs that ended before balance was reached
+  double largest_force = 0.0;            ///< of a balance so far [N]
+  double small_strain_at_largest = 0.0;  ///< by which small strain has more force for the same places, as a
+                                         ///< fraction of that force
+  double last_small_strain = 0.0;        ///< likewise of the present balance
 };
 
 /// Finds the balance of a body on two levels beside the tick, for the places where the tick has the loaded

@@ -12,7 +12,8 @@ namespace palpate {
 /// E(q) of a body at u = P q, a subspace of its mesh's displacements: mesh nodes follow the field, except
 /// along axes on which they are held. A sum over parts of each cell, with the law at their mean deformation
 /// gradient; what the gradient varies by within a part has the energy of small strain, turned with the part.
-/// The tangent at rest is P^T K P, and the cost does not depend on the mesh.
+/// The tangent at rest is P^T K P (of tet4a with K of tet4, which is stiffer), and the cost does not depend
+/// on the mesh.
 class CoarseBody {
  public:
   /// `fine` must outlive it.

@@ -314,6 +314,7 @@ void TwoLevels::set_loaded(std::span<const Index> nodes) {
                     [&](Index dof, double weight, Eigen::Index axis) { P(dof, d * k + axis) = weight; });
   }
   largest_ = k_all > 0 ? M_.diagonal().maxCoeff() : 0.0;
+  Xi_ = M_;
   const Eigen::SparseMatrix<double> sparse = P.sparseView();
   const MatrixXd by_field = sparse.transpose() * (parts_->nodes->compliance * sparse);
   for (Eigen::Index a = 0; a < d * k_all; ++a) {
@@ -391,6 +392,7 @@ TwoLevelReport TwoLevels::find(std::span<const Index> nodes, std::span<const dou
   for (Eigen::Index k = 0; k < std::ssize(loaded_); ++k) {
     for (Eigen::Index axis = 0; axis < d; ++axis) forces_.push_back(at.f[3 * k + axis]);
   }
+  report.small_strain = small_strain(contact, at.f);
   find_remainder(at);
   find_displacement();
   keep_columns(contact, at, J);
@@ -407,6 +409,29 @@ void TwoLevels::keep_columns(const Contact& contact, const Look& at, const Matri
       column.J.row(contact.dofs[i]) = turned.col(static_cast<Eigen::Index>(i)).head(dimension_).transpose();
     columns_.push_back(std::move(column));
   }
+}
+
+/// Sum of forces f + A^T lambda that by small strain hold the groups where they are along their forces, and
+/// are free to move across: A Xi (f + A^T lambda) = A u.
+Vec3 TwoLevels::small_strain(const Contact& contact, const VectorXd& f) const {
+  const auto k_all = std::ssize(loaded_);
+  if (k_all == 0) return Vec3::Zero();
+  Eigen::Matrix3Xd along = Eigen::Matrix3Xd::Zero(3, contact.groups);
+  for (Eigen::Index k = 0; k < k_all; ++k)
+    along.col(contact.group[static_cast<std::size_t>(k)]) += f.segment<3>(3 * k);
+  along.colwise().normalize();
+  MatrixXd A = MatrixXd::Zero(contact.groups, 3 * k_all);
+  VectorXd u(3 * k_all);
+  for (Eigen::Index k = 0; k < k_all; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    u.segment<3>(3 * k) = contact.u[at];
+    A.block<1, 3>(contact.group[at], 3 * k) = contact.share[at] * along.col(contact.group[at]).transpose();
+  }
+  const MatrixXd A_Xi = A * Xi_;
+  MatrixXd S = A_Xi * A.transpose();
+  S.diagonal().array() += floor_of_group * largest_;
+  const VectorXd lambda = Eigen::LDLT<MatrixXd>(S).solve(A * u - A_Xi * f);
+  return f.reshaped(3, k_all).rowwise().sum() + along * lambda;
 }
 
 /// s of all stored nodes: (Xi - P K_c^-1 P^T) R^T f.

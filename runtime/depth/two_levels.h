@@ -16,6 +16,8 @@ struct TwoLevelReport {
   bool converged = false;
   int steps = 0;          ///< Newton's
   double residual = 0.0;  ///< last change of q relative to the largest q so far, in the norm of K_c
+  Vec3 small_strain =
+      Vec3::Zero();  ///< force by which it holds the nodes where they are along their forces [N]
 };
 
 /// Displacement on two levels, u_i = P_i q + R_i s_i with s = (Xi - P K_c^-1 P^T) R^T f: q is a coarse field
@@ -62,6 +64,7 @@ class TwoLevels {
   void renew_tangent(const Eigen::VectorXd& dE, double most);
   template <class Visit>
   void for_each_weight(Index node, const Visit& visit) const;
+  [[nodiscard]] Vec3 small_strain(const Contact& contact, const Eigen::VectorXd& f) const;
   void find_remainder(const Look& at);
   void find_displacement();
   void make_contact(std::span<const Index> nodes, std::span<const double> f, std::span<const double> u,
@@ -85,7 +88,8 @@ class TwoLevels {
   std::vector<Index> loaded_;
   std::vector<double> forces_;
   double largest_ = 0.0;  // compliance of a loaded node at rest [m/N]
-  Eigen::MatrixXd M_;     // [3k x 3k] remainder's compliance of `loaded_`
+  Eigen::MatrixXd Xi_;    // [3k x 3k] Green's functions of `loaded_`
+  Eigen::MatrixXd M_;     // [3k x 3k] the remainder's
   Eigen::MatrixXd H_;     // of the last balance
   std::vector<CoarseColumn> columns_;
   std::vector<double> s_, u_;  // [n] remainder and displacement of all stored nodes

@@ -123,6 +123,9 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
       throw Error("a live solver meets the tool with the body's inertia by itself", "--contact",
                   "leave out --contact or --solver");
     }
+    if (model.mesh.element == ElementType::tet4a)
+      warn_once(file.string() +
+                ": a live body takes tet4a as tet4, which is stiffer to a touch (docs/live.md)");
     auto live = std::make_shared<const LiveParts>(make_live_parts(model, options.live));
     model = live_model(std::move(model), *live, options.live);
     return {std::move(model), std::move(live)};

@@ -11,7 +11,7 @@ double factor_of(ElementType element) noexcept {
     case ElementType::tet4:
       return 1.1;
     case ElementType::tet4a:
-      return 0.67;
+      return 0.71;
     case ElementType::tet10:
       return 0.98;
     case ElementType::hex8:

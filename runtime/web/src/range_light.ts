@@ -31,6 +31,17 @@ export function turned_beside(rest_normal: ArrayLike<number>, { position, normal
   return Math.acos(Math.max(-1, least));
 }
 
+/** How much more force small strain would have, in few words and in a sentence; null where that is not known, or less than 1 %. */
+export function small_strain_words(more: number | null | undefined): { short: string; sentence: string } | null {
+  const percent = Math.round(100 * (more ?? 0));
+  if (percent === 0) return null;
+  const size = Math.abs(percent);
+  return {
+    short: `small strain ${percent > 0 ? '+' : '−'}${size} %`,
+    sentence: `By small strain this touch would have ${size} % ${percent > 0 ? 'more' : 'less'} force.`,
+  };
+}
+
 /** What it means, with the numbers, and what to do. */
 export function light_title(light: Light, change: NonNullable<State['change']>, studied: number, is_deep: boolean): string {
   const strain = (100 * change.strain).toFixed(0);
@@ -41,7 +52,7 @@ export function light_title(light: Light, change: NonNullable<State['change']>, 
 }
 
 /** The light beside the contacts, and what it means where it is not green; `beside` is what turned_beside has. */
-export function show_light({ change: all, model }: State, beside: number): void {
+export function show_light({ change: all, model, small_strain }: State, beside: number): void {
   const change = all ? { ...all, rotation: Math.min(all.rotation, beside) } : all;
   const of_body = light_of(change, model.studied_rotation);
   const light = of_body === 'good' && light_of(all, model.studied_rotation) !== 'good' ? null : of_body; // nothing is known of a steep dent
@@ -50,8 +61,9 @@ export function show_light({ change: all, model }: State, beside: number): void 
   part('range-note').hidden = light === null || light === 'good';
   if (light === null || !change || !model.studied_rotation) return;
   shown.dataset.light = light;
-  write(shown, `● turned ${(degrees * change.rotation).toFixed(0)}°`);
+  const words = small_strain_words(small_strain);
+  write(shown, `● ${words?.short ?? `turned ${(degrees * change.rotation).toFixed(0)}°`}`);
   write(part('range-note'), light_title(light, change, model.studied_rotation, model.deep === true));
-  shown.title = light_title(light, change, model.studied_rotation, model.deep === true);
+  shown.title = `${words ? `${words.sentence} ` : ''}${light_title(light, change, model.studied_rotation, model.deep === true)}`;
   shown.ariaLabel = `${light === 'good' ? 'within' : light === 'near' ? 'near the end of' : 'beyond'} what was studied: ${shown.title}`;
 }

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { light_of, light_title, turned_beside } from '../src/range_light';
+import { light_of, light_title, small_strain_words, turned_beside } from '../src/range_light';
 
 const turned = (degrees: number) => ({ rotation: (degrees * Math.PI) / 180, strain: 0.034 });
 const studied = (18 * Math.PI) / 180;
@@ -26,6 +26,12 @@ test('it says the numbers and what to do', () => {
   assert.match(light_title('over', turned(30), studied, false), /turn on Depth/);
   assert.doesNotMatch(light_title('over', turned(95), studied, true), /turn on Depth/);
   assert.match(light_title('over', turned(95), studied, true), /--solver corotational/);
+});
+
+test('it says what small strain would have', () => {
+  assert.deepEqual(small_strain_words(0.361), { short: 'small strain +36 %', sentence: 'By small strain this touch would have 36 % more force.' });
+  assert.equal(small_strain_words(-0.02)?.short, 'small strain −2 %');
+  for (const none of [null, undefined, 0, 0.004]) assert.equal(small_strain_words(none), null);
 });
 
 test('what turns within the dent of a tool does not count, and what turns beside it does', () => {

@@ -212,8 +212,12 @@ TEST_F(TwoLevelBar, IsSmallStrainOfSmallLoads) {
   for (const double size : {2e-5, 1e-5}) {
     levels.rest();
     const Vec3 to = size * Vec3(0.3, 0.5, -0.8);
-    levels.find(nodes, std::vector<double>(3, 0.0), same(to, 1), 1e-12, 60);
+    const Vec3 small_strain =
+        levels.find(nodes, std::vector<double>(3, 0.0), same(to, 1), 1e-12, 60).small_strain;
     errors.push_back((Xi * sum(levels.forces()) - to).norm());
+    const Vec3 along = sum(levels.forces()).normalized();
+    EXPECT_NEAR(along.dot(Xi * small_strain), along.dot(to), 1e-4 * size);
+    EXPECT_NEAR(small_strain.norm() / sum(levels.forces()).norm(), 1.0, 0.02);
   }
   EXPECT_LT(errors[0], 0.02 * 2e-5);
   EXPECT_NEAR(errors[0] / errors[1], 4.0, 0.5);
