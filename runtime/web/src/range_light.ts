@@ -37,7 +37,7 @@ export function small_strain_words(more: number | null | undefined): { short: st
   if (percent === 0) return null;
   const size = Math.abs(percent);
   return {
-    short: `small strain ${percent > 0 ? '+' : '−'}${size} %`,
+    short: `linear ${percent > 0 ? '+' : '−'}${size} %`,
     sentence: `By small strain this touch would have ${size} % ${percent > 0 ? 'more' : 'less'} force.`,
   };
 }
