@@ -20,6 +20,8 @@ RUNTIME = BUILD / "runtime" / "palpate-runtime"
 MODEL = """name = "cube"
 [geometry]
 box = {origin = [0, 0, 0], size = [1, 1, 1], cells = [2, 2, 2]}
+[mesh]
+element = "tet4"
 [material]
 youngs_modulus = 1e3
 poissons_ratio = 0.3

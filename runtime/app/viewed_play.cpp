@@ -360,7 +360,8 @@ void ViewedPlay::check(const Settings& settings) const {
   }
   if (settings.overlay.has_patches() && settings.overlay.rings > most_rings_) {
     throw Error(most_rings_ == 0
-                    ? "the file keeps no layers below the surface, which overlays need"
+                    ? "the file keeps no layers below the surface, which overlays need, or is of tet4a, "
+                      "which has none"
                     : fmt::format("the file keeps layers below the surface for at most {} rings, not {}",
                                   most_rings_, settings.overlay.rings),
                 "--overlay",

@@ -98,7 +98,7 @@ void TwoLevelMotion::take_load(const MotionJob& job) {
 TwoLevelReport TwoLevelMotion::find() {
   if (failures_ == most_failures) levels_.rest();
   TwoLevels last = levels_;
-  const TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
+  TwoLevelReport report = levels_.find(nodes_, f_, places_, tolerance, most_steps);
   const auto all_finite = [](const std::vector<double>& values) {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   };

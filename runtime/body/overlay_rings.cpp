@@ -9,6 +9,7 @@ namespace palpate {
 
 int overlay_rings(const Body& body) {
   const Model& model = body.model();
+  if (model.mesh.element == ElementType::tet4a) return 0;
   const ElementsAtNodes at(model.mesh);
   const unsigned all_axes = (1U << model.dimension()) - 1U;
   std::vector<Index> centres;

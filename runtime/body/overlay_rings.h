@@ -6,7 +6,7 @@
 namespace palpate {
 
 /// Largest number of rings of any overlay of the body: the number of layers stored below its surface. From 0
-/// (no overlays) to `most_rings`.
+/// (no overlays, as of tet4a) to `most_rings`.
 [[nodiscard]] int overlay_rings(const Body& body);
 
 }  // namespace palpate

@@ -45,6 +45,8 @@ export function cube(cells, more = '') {
   return `name = "cube"
 [geometry]
 box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [${cells}, ${cells}, ${cells}] }
+[mesh]
+element = "tet4"
 [material]
 youngs_modulus = 1.0
 poissons_ratio = 0.3

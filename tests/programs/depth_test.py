@@ -153,17 +153,17 @@ class Depth(ProgramTest):
             self.assertIn(words, result.stderr)
             self.assertIn("--depth", result.stderr)
 
-    def bake_liver(self) -> Path:
+    def bake_liver(self, element="tet4a") -> Path:
         image = MODELS / "liver" / "liver.inr.gz"
         if not image.exists():
             self.skipTest("the liver's image is not there: scripts/demo gets it")
-        text = (MODELS / "liver" / "model.toml").read_text().replace("edge_length = 0.0055", "edge_length = 0.0085").replace('"layers"\nlayers = 2', '"surface"')
+        text = (MODELS / "liver" / "model.toml").read_text().replace("edge_length = 0.0055", f'edge_length = 0.0085\nelement = "{element}"').replace('"layers"\nlayers = 2', '"surface"')
         return self.bake(text.replace('"liver.inr.gz"', f'"{image}"'))
 
     def test_a_fast_hand_deep_in_a_liver(self):
-        """A ball of 20 mm is pressed in by some 18 mm and slid, at up to 300 mm/s."""
+        """A ball of 20 mm is pressed in by some 16 mm and slid, at up to 300 mm/s. 2 mm deeper, as with the stiffer tet4, it is inside the thin border for 35 ms."""
         file = self.bake_liver()
-        self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{y / 1000},{z / 1000}\n" for t, x, y, z in FAST))
+        self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{(y - 2) / 1000},{z / 1000}\n" for t, x, y, z in FAST))
         result = run(RUNTIME, "play", file, "--device", "script:fast.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", "yes", "--report", "-",
                      cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -251,8 +251,8 @@ class Depth(ProgramTest):
         self.assertAlmostEqual(forces[0], forces[1], delta=0.02 * forces[1])
 
     def test_a_small_ball_on_a_fine_liver(self):
-        """Small strain is 9 to 16 % too stiff in this press (docs/measurements/live.md#depth)."""
-        file = self.bake_liver()
+        """Small strain is 9 to 16 % too stiff in this press by tet4 (docs/measurements/live.md#depth)."""
+        file = self.bake_liver("tet4")
         reports = []
         for depth in ("yes", "no"):
             result = run(RUNTIME, "play", file, "--device", f"script:{MODELS / 'liver' / 'palpation.csv'}", "--fast", "--tool", "sphere:0.008", "--depth", depth,

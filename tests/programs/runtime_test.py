@@ -54,7 +54,7 @@ axes = "{axis}"
 traction = {numbers(up, stress)}
 half_space = {{ point = {numbers(up, 1)}, normal = {numbers(up, 1)} }}
 """ if stress else ""
-    shape = "rectangle = { size = [1, 1], cells = [4, 4] }" if plane else "box = { size = [1, 1, 1], cells = [4, 4, 4] }"
+    shape = "rectangle = { size = [1, 1], cells = [4, 4] }" if plane else "box = { size = [1, 1, 1], cells = [4, 4, 4] }\n[mesh]\nelement = \"tet4\""
     return f"""name = "{name}"
 {'plane = "stress"' if plane else ""}
 [geometry]

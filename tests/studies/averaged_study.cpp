@@ -40,10 +40,11 @@ Body body_of(const Model& model, ElementType element) {
   const std::span<const EdgeNodes> edges = element_edges(element);
   for (Index e = 0; element == ElementType::tet10 && e < body.mesh.elements(); ++e) {
     const std::span<const Index> nodes = body.mesh.element_nodes(e);
-    for (std::size_t k = 0; k < edges.size(); ++k)
+    for (std::size_t k = 0; k < edges.size(); ++k) {
       body.fixed[static_cast<std::size_t>(nodes[4 + k])] =
           body.fixed[static_cast<std::size_t>(nodes[edges[k][0]])] &
           body.fixed[static_cast<std::size_t>(nodes[edges[k][1]])];
+    }
   }
   return body;
 }

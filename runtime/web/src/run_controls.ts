@@ -134,7 +134,7 @@ export class RunControls {
     show_value(select('contact'), settings.contact ?? 'quasi-static');
     select('contact').disabled = !model.moves;
     select('contact').title = model.moves ? 'Dynamic: the body swings' : 'This model has no dynamics: the body cannot swing';
-    this.show_overlay_limits(model.overlay_rings ?? most_rings);
+    this.show_overlay_limits(model.overlay_rings ?? most_rings, model.element);
     if (model.overlay_refinement) {
       const [least, most] = model.overlay_refinement;
       input('overlay-r').min = String(least);
@@ -169,13 +169,14 @@ export class RunControls {
   }
 
   /** No more is offered than the file has layers for. */
-  private show_overlay_limits(rings: number): void {
+  private show_overlay_limits(rings: number, element: string): void {
     const most = Math.min(rings, most_rings);
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = most === 0;
     const field = input('overlay-rings');
     field.max = String(Math.max(most, 1));
     if (most > 0 && Number(field.value) > most) field.value = field.max;
-    const why = `This file keeps ${rings === 0 ? 'no layers' : `layers for ${rings} ${rings === 1 ? 'ring' : 'rings'}`} below the surface; precomputed with more [storage] layers it would have more`;
+    const of_file = `This file keeps ${rings === 0 ? 'no layers' : `layers for ${rings} ${rings === 1 ? 'ring' : 'rings'}`} below the surface; precomputed with more [storage] layers it would have more`;
+    const why = element === 'tet4a' ? 'Elements of tet4a share their stiffness, and overlays replace single ones: they want [mesh] element = "tet10"' : of_file;
     write(part('overlay-note'), `${why}.`);
     part('overlay-note').hidden = most > 0;
     field.title = rings < most_rings ? why : 'How many elements around the tool';
