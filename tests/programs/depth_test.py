@@ -168,7 +168,7 @@ class Depth(ProgramTest):
                      cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         report = json.loads(result.stdout)
-        self.assertGreater(report["ticks_in_contact"], 3000)
+        self.assertGreater(report["ticks_in_contact"], 2800)
         self.assertEqual([report["status_ticks"][status] for status in ("inside_body", "result_not_finite", "not_converged")], [0, 0, 0])
         self.assertLess(report["largest_jump_N"], 0.03 * report["largest_force_N"])
 

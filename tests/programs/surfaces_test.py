@@ -113,7 +113,7 @@ scope = "surface"
     def test_elements_are_those_that_are_asked_for(self):
         self.write("box.off", off())
         counts = []
-        for element in ("tet4", "tet10"):
+        for element in ("tet4a", "tet10"):
             told = self.baked("box.off", "--element", element, "--renew", "--dry-run")
             self.assertIn(f"elements ({element})", told)
             counts.append(int(re.search(r"(\d+) stored dofs", told)[1]))
