@@ -1,7 +1,6 @@
 #include "meshes/averaged_strain.h"
 
 #include <algorithm>
-#include <array>
 #include <tuple>
 
 #include "meshes/element.h"
@@ -87,16 +86,19 @@ void visit_all(const Mesh& mesh, std::vector<Beside> all, double share,
 
 }  // namespace
 
-void for_each_strain_domain(const Mesh& mesh, std::span<const Index> material_of_element,
-                            const std::function<void(const StrainDomain&)>& visit) {
+void for_each_edge_domain(const Mesh& mesh, std::span<const Index> material_of_element,
+                          const std::function<void(const StrainDomain&)>& visit) {
   visit_all(mesh, beside_edges(mesh, material_of_element), 1.0 / traits(mesh.element).edges, visit);
+}
+
+void for_each_node_domain(const Mesh& mesh, std::span<const Index> material_of_element,
+                          const std::function<void(const StrainDomain&)>& visit) {
   visit_all(mesh, beside_nodes(mesh, material_of_element), 1.0 / traits(mesh.element).nodes, visit);
 }
 
 Eigen::MatrixXd domain_stiffness(const StrainDomain& domain, const Material& material) {
-  const double E = material.youngs_modulus, nu = material.poissons_ratio;
-  const double all_mu = E / (2.0 * (1.0 + nu)), all_lambda = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
-  const double of_edges = std::min(all_lambda, most_of_edges * all_mu);
+  const double all_mu = shear_modulus(material), all_lambda = lame_lambda(material),
+               of_edges = std::min(all_lambda, most_of_edges * all_mu);
   const double mu = domain.is_of_edge ? all_mu : 0.0,
                lambda = domain.is_of_edge ? of_edges : all_lambda - of_edges;
   const Eigen::Index nodes = domain.gradients.rows();

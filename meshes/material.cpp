@@ -4,16 +4,13 @@
 
 namespace palpate {
 
-namespace {
-
 double lame_lambda(const Material& m) {
   return m.youngs_modulus * m.poissons_ratio / ((1.0 + m.poissons_ratio) * (1.0 - 2.0 * m.poissons_ratio));
 }
+
 double shear_modulus(const Material& m) {
   return m.youngs_modulus / (2.0 * (1.0 + m.poissons_ratio));
 }
-
-}  // namespace
 
 ElasticityMatrix elasticity_matrix(const Material& material, Analysis analysis) {
   const double mu = shear_modulus(material);

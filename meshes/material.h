@@ -30,6 +30,10 @@ struct Material {
   std::array<double, 6> initial_strain{};
 };
 
+/// Lame's constants lambda and mu of a body in space [Pa].
+double lame_lambda(const Material& material);
+double shear_modulus(const Material& material);
+
 /// D of sigma = D (epsilon - eps_0) for engineering strain, shear gamma = 2 epsilon (theory.md section 1).
 ElasticityMatrix elasticity_matrix(const Material& material, Analysis analysis = Analysis::solid);
 

@@ -42,13 +42,12 @@ std::vector<Index> free_nodes(const StiffnessInput& body, const Stiffness& stiff
   return result;
 }
 
-/// Visits the nodes of each element or, of tet4a, of each strain domain of a node, in which those of edges
-/// are.
+/// Visits the nodes of each element or, of tet4a, of each node's strain domain; the domain of an edge is
+/// within those of its ends.
 void for_each_coupled(const StiffnessInput& body, const std::function<void(std::span<const Index>)>& visit) {
   if (body.mesh.element == ElementType::tet4a) {
-    for_each_strain_domain(body.mesh, body.material_of_element, [&](const StrainDomain& domain) {
-      if (!domain.is_of_edge) visit(domain.nodes);
-    });
+    for_each_node_domain(body.mesh, body.material_of_element,
+                         [&](const StrainDomain& domain) { visit(domain.nodes); });
     return;
   }
   for (Index e = 0; e < body.mesh.elements(); ++e) visit(body.mesh.element_nodes(e));
@@ -159,10 +158,12 @@ Stiffness assemble_stiffness(const StiffnessInput& body) {
       find_upper_neighbours(body, free_nodes(body, result), result.node_start.size() - 1);
   result.K = make_pattern(upper, result.node_start);
   if (body.mesh.element == ElementType::tet4a) {
-    for_each_strain_domain(body.mesh, body.material_of_element, [&](const StrainDomain& domain) {
+    const auto add = [&](const StrainDomain& domain) {
       const Material& material = body.materials[static_cast<std::size_t>(domain.material)];
       scatter(body, domain.nodes, domain_stiffness(domain, material), result);
-    });
+    };
+    for_each_edge_domain(body.mesh, body.material_of_element, add);
+    for_each_node_domain(body.mesh, body.material_of_element, add);
     return result;
   }
 

@@ -183,8 +183,8 @@ void print_depth(const DepthTelling& depth) {
   say(stderr, "depth: the body turned by up to {:.3g} degrees, its compliance {} times",
       degrees_a_radian * depth.largest_rotation, depth.turns);
   if (depth.largest_force > 0.0)
-    say(stderr, "; for its largest force of {:.3g} N small strain has {:.3g} % {}", depth.largest_force,
-        100.0 * std::abs(depth.small_strain_at_largest),
+    say(stderr, "; for its largest force in balance, {:.3g} N, small strain has {:.3g} % {}",
+        depth.largest_force, 100.0 * std::abs(depth.small_strain_at_largest),
         depth.small_strain_at_largest < 0.0 ? "less" : "more");
   say(stderr, "\n");
   if (depth.last_residual > most_residual) {

@@ -110,7 +110,9 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
         });
   }
   if (viewer.pictures)
-    viewed_.emplace(body, state_, SurfaceFramesOptions{.ticks_per_frame = 1}, viewer.pictures);
+    viewed_.emplace(
+        body, state_, SurfaceFramesOptions{.ticks_per_frame = 1},
+        [this, show = viewer.pictures](SurfacePicture picture) { show(std::move(picture), small_strain()); });
   if (viewer.ticks) feed_.emplace(viewer.ticks);
   if (!options_.fast) {
     monitor_.emplace(MonitorOptions{.rate = settings.rate,

@@ -23,7 +23,9 @@ constexpr const char* standard_output = "-";
 struct SessionViewer {
   LoopControl* control = nullptr;
   TickFeed::Sink ticks;
-  SurfaceFrames::Sink pictures;
+  /// With a picture, by which small strain has more force than the body on two levels then, as a fraction of
+  /// it; empty for other bodies.
+  std::function<void(SurfacePicture, std::optional<double>)> pictures;
   Recorder::OnFailure recording_failed;
 };
 
@@ -51,10 +53,6 @@ class PlaySession {
   /// Reason if the recording of the finished run is incomplete; empty if it is complete, or there is none.
   [[nodiscard]] const std::optional<Error>& recording_failure() const noexcept { return recording_failure_; }
 
-  /// By which small strain has more force than the body on two levels now, as a fraction of it; empty for
-  /// other bodies. For any thread.
-  [[nodiscard]] std::optional<double> small_strain() const;
-
   /// Number of ticks missing from the recording.
   [[nodiscard]] std::int64_t dropped() const { return recorder_ ? recorder_->dropped() : 0; }
 
@@ -63,6 +61,7 @@ class PlaySession {
   void tell(const PlayedParts* parts = nullptr) const;
 
  private:
+  [[nodiscard]] std::optional<double> small_strain() const;
   LoopReport run_with_rights(const std::atomic<bool>& stop);
   void finish_recording();
 

@@ -148,8 +148,8 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
       SessionViewer{.control = &control_,
                     .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
                     .pictures =
-                        [this](SurfacePicture picture) {
-                          take_change(picture.frame);
+                        [this](SurfacePicture picture, std::optional<double> small_strain) {
+                          take_change(picture.frame, small_strain);
                           server_->show_picture(std::move(picture), body_.get());
                         },
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
@@ -217,13 +217,7 @@ void ViewedPlay::show_body() {
 }
 
 LoopReport ViewedPlay::run_act(PlaySession& session, const std::atomic<bool>& stop) {
-  const auto set_playing = [this](const PlaySession* now) {
-    const std::lock_guard lock(mutex_);
-    playing_ = now;
-  };
-  set_playing(&session);
   const LoopReport& report = session.run(stop);
-  set_playing(nullptr);
   if (!session.recording_failure()) return report;
   recording_failed_ = true;
   if (stop) return report;
@@ -396,7 +390,7 @@ void ViewedPlay::take_recording_failure(const Error& reason) {
 }
 
 /// Called by the thread that makes pictures, no more often than the state is sent: it takes milliseconds.
-void ViewedPlay::take_change(const SurfaceFrame& frame) {
+void ViewedPlay::take_change(const SurfaceFrame& frame, std::optional<double> small_strain) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_change_) return;
   next_change_ = now + state_period;
@@ -407,7 +401,7 @@ void ViewedPlay::take_change(const SurfaceFrame& frame) {
   const SurfaceChange change = surface_change(body_->dimension(), body_->drawn_simplices(), mesh, u);
   const std::lock_guard lock(mutex_);
   state_.change = change;
-  state_.small_strain = playing_ != nullptr ? playing_->small_strain() : std::nullopt;
+  state_.small_strain = small_strain;
 }
 
 void ViewedPlay::take_ticks(std::span<const TickNote> notes) {

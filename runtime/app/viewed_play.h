@@ -77,7 +77,7 @@ class ViewedPlay : public ViewedRun {
   void begin_making(const char* what);
   void refuse(const Error& why);
   void take_recording_failure(const Error& reason);
-  void take_change(const SurfaceFrame& frame);
+  void take_change(const SurfaceFrame& frame, std::optional<double> small_strain);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 
@@ -101,8 +101,7 @@ class ViewedPlay : public ViewedRun {
   mutable std::mutex mutex_;  // guards the following; the loop never locks it
   Plan requested_;            // next session
   RunState state_;
-  const PlaySession* playing_ = nullptr;  // null: none
-  bool changed_ = true;                   // since the last state sent to pages
+  bool changed_ = true;  // since the last state sent to pages
   std::condition_variable_any tell_;
 };
 

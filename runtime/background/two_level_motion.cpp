@@ -28,6 +28,13 @@ double half_sine(const Mat3& A, const Mat3& B) {
   return (A - B).norm() / std::sqrt(8.0);
 }
 
+/// Sum of vectors of d components.
+Vec3 sum_of(const std::vector<double>& vectors, int d) {
+  Vec3 sum = Vec3::Zero();
+  for (Index k = 0; k < std::ssize(vectors) / d; ++k) sum += vector_at(vectors, d, k);
+  return sum;
+}
+
 }  // namespace
 
 TwoLevelMotion::TwoLevelMotion(const Body& body)
@@ -114,9 +121,7 @@ TwoLevelReport TwoLevelMotion::find() {
 /// Difference of the tick's force from the balance's for the same places, as a fraction, if a hand feels it.
 double TwoLevelMotion::find_force_error() {
   const int d = body_.dimension();
-  Vec3 in_tick = Vec3::Zero(), in_balance = Vec3::Zero();
-  for (Index k = 0; k < std::ssize(nodes_); ++k) in_tick += vector_at(f_, d, k);
-  for (Index k = 0; k < std::ssize(levels_.loaded()); ++k) in_balance += vector_at(levels_.forces(), d, k);
+  const Vec3 in_tick = sum_of(f_, d), in_balance = sum_of(levels_.forces(), d);
   const double error = (in_tick - in_balance).norm(), force = in_tick.norm();
   largest_force_ = std::max(largest_force_, in_balance.norm());
   const bool is_felt = error > felt_error * force && error > least_error * largest_force_;
@@ -225,10 +230,7 @@ void TwoLevelMotion::tell(const TwoLevelReport& report) {
   telling_.unbalanced += report.converged ? 0 : 1;
   telling_.last_small_strain = 0.0;
   if (!report.converged || levels_.loaded().empty()) return;
-  Vec3 sum = Vec3::Zero();
-  for (Index k = 0; k < std::ssize(levels_.loaded()); ++k)
-    sum += vector_at(levels_.forces(), body_.dimension(), k);
-  const double force = sum.norm();
+  const double force = sum_of(levels_.forces(), body_.dimension()).norm();
   if (force < least_error * telling_.largest_force || force == 0.0) return;
   telling_.last_small_strain = report.small_strain.norm() / force - 1.0;
   if (force <= telling_.largest_force) return;

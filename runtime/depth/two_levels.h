@@ -16,8 +16,8 @@ struct TwoLevelReport {
   bool converged = false;
   int steps = 0;          ///< Newton's
   double residual = 0.0;  ///< last change of q relative to the largest q so far, in the norm of K_c
-  Vec3 small_strain =
-      Vec3::Zero();  ///< force by which it holds the nodes where they are along their forces [N]
+  /// Sum of the forces by which small strain would hold the nodes where they are along their forces [N].
+  Vec3 small_strain = Vec3::Zero();
 };
 
 /// Displacement on two levels, u_i = P_i q + R_i s_i with s = (Xi - P K_c^-1 P^T) R^T f: q is a coarse field

@@ -112,7 +112,7 @@ struct Loaded {
     const Eigen::Index d = kind.dimension();
     internal.assign(body.mesh.nodes.size(), Vec3::Zero());
     if (kind.element == ElementType::tet4a) {
-      for_each_strain_domain(body.mesh, body.material_of_element, [&](const StrainDomain& domain) {
+      const auto add = [&](const StrainDomain& domain) {
         Eigen::VectorXd u(3 * std::ssize(domain.nodes));
         Eigen::Index row = 0;
         for (const Index node : domain.nodes) u.segment<3>(3 * row++) = u0[static_cast<std::size_t>(node)];
@@ -121,7 +121,9 @@ struct Loaded {
         row = 0;
         for (const Index node : domain.nodes)
           internal[static_cast<std::size_t>(node)] += force.segment<3>(3 * row++);
-      });
+      };
+      for_each_edge_domain(body.mesh, body.material_of_element, add);
+      for_each_node_domain(body.mesh, body.material_of_element, add);
       return;
     }
     for (Index e = 0; e < body.mesh.elements(); ++e) {
