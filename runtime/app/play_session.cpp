@@ -109,10 +109,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
           }
         });
   }
-  if (viewer.pictures)
-    viewed_.emplace(
-        body, state_, SurfaceFramesOptions{.ticks_per_frame = 1},
-        [this, show = viewer.pictures](SurfacePicture picture) { show(std::move(picture), small_strain()); });
+  if (viewer.pictures) show_pictures(viewer);
   if (viewer.ticks) feed_.emplace(viewer.ticks);
   if (!options_.fast) {
     monitor_.emplace(MonitorOptions{.rate = settings.rate,
@@ -166,6 +163,12 @@ LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   const RealTimeRights rights(options_.processor);
   if (!rights.refused().empty()) print_warning(rights.refused());
   return run_loop(parts, loop, stop);
+}
+
+void PlaySession::show_pictures(const SessionViewer& viewer) {
+  viewed_.emplace(
+      body_, state_, SurfaceFramesOptions{.ticks_per_frame = 1},
+      [this, show = viewer.pictures](SurfacePicture picture) { show(std::move(picture), small_strain()); });
 }
 
 std::optional<double> PlaySession::small_strain() const {

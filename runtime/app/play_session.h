@@ -61,6 +61,7 @@ class PlaySession {
   void tell(const PlayedParts* parts = nullptr) const;
 
  private:
+  void show_pictures(const SessionViewer& viewer);
   [[nodiscard]] std::optional<double> small_strain() const;
   LoopReport run_with_rights(const std::atomic<bool>& stop);
   void finish_recording();
