@@ -23,6 +23,8 @@ constexpr int most_halvings = 30;
 constexpr double most_of_cell = 0.3;     // of its edge, by which a coarse node moves in a step at most
 constexpr double rounding = 1e-9;        // of the largest q: a step that is not made
 constexpr double least_stiffness = 0.2;  // of the coarse field in the tick, as a share of that at rest
+constexpr double least_tangent = 0.9;    // of T that G leaves in the tick (docs/depth.md)
+constexpr double least_of_turns = 1e-3;  // of G
 constexpr double most_lag = 0.1;         // of the tangent of E in a search, as a share of it
 constexpr double most_lag_of_compliance = 0.03;  // of the tangent of E in W
 
@@ -52,18 +54,25 @@ Eigen::LLT<MatrixXd> positive_factor(const MatrixXd& A, const MatrixXd& K) {
   return factor;
 }
 
-/// A^-1, or where A is not positive definite (A + share K)^-1, by which no field is softer than
-/// `least_stiffness` of that at rest: a tool holds a body where it would not stay by itself.
-MatrixXd stiff_inverse(const MatrixXd& A, const MatrixXd& K) {
-  double share = 0.0;
-  Eigen::LLT<MatrixXd> factor(A);
-  if (factor.info() != Eigen::Success) {
-    while (Eigen::LLT<MatrixXd>(A + (share - least_stiffness) * K).info() != Eigen::Success && share < 1e3)
-      share = std::max(0.1, 1.5 * share);
-    factor.compute(A + share * K);
+bool is_positive(const MatrixXd& A) {
+  return Eigen::LLT<MatrixXd>(A).info() == Eigen::Success;
+}
+
+/// Inverse of T + G, the coarse body's tangent and what given forces add by turning the remainder. With T
+/// goes as much of K as leaves no field softer than `least_stiffness` of that at rest where T is not positive
+/// definite, since a tool holds a body where it would not stay by itself; and as little of G as leaves none
+/// softer than `least_tangent` of T: forces are not given but found by each tick, and change.
+MatrixXd stiff_inverse(MatrixXd T, const MatrixXd& G, const MatrixXd& K) {
+  if (!is_positive(T)) {
+    double share = 0.1;
+    while (!is_positive(T + (share - least_stiffness) * K) && share < 1e3) share *= 1.5;
+    T += share * K;
   }
-  const MatrixXd root = factor.matrixL().solve(MatrixXd::Identity(A.rows(), A.cols()));
-  MatrixXd inverse = MatrixXd::Zero(A.rows(), A.cols());
+  double of_turns = 1.0;
+  while (!is_positive((1.0 - least_tangent) * T + of_turns * G) && of_turns > least_of_turns) of_turns *= 0.7;
+  const Eigen::LLT<MatrixXd> factor(T + of_turns * G);
+  const MatrixXd root = factor.matrixL().solve(MatrixXd::Identity(T.rows(), T.cols()));
+  MatrixXd inverse = MatrixXd::Zero(T.rows(), T.cols());
   inverse.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose());
   return inverse.selfadjointView<Eigen::Lower>();
 }
@@ -466,12 +475,11 @@ void TwoLevels::find_displacement() {
 }
 
 TwoLevelState TwoLevels::state(std::vector<Index> near) {
-  H_ -= tangent_;
+  const MatrixXd of_turns = H_ - tangent_;
   renew_tangent(dE_, most_lag_of_compliance);
-  H_ += tangent_;
   return {.nodes = parts_->nodes,
           .turns = turns_,
-          .H_inverse = stiff_inverse(H_, parts_->K),
+          .H_inverse = stiff_inverse(tangent_, of_turns, parts_->K),
           .columns = columns_,
           .near = std::move(near)};
 }

@@ -161,15 +161,16 @@ class Depth(ProgramTest):
         return self.bake(text.replace('"liver.inr.gz"', f'"{image}"'), "--force")
 
     def test_a_fast_hand_deep_in_a_liver(self):
-        """A ball of 20 mm is pressed in by some 18 mm and slid, at up to 300 mm/s. By tet4a, which is softer, it would be inside the thin border for 35 ms: 2 mm less deep."""
-        for element, less, least in (("tet4", 0, 3000), ("tet4a", 2, 2800)):
+        """A ball of 20 mm is pressed in by some 18 mm and slid, at up to 300 mm/s. Where the border gives way, given forces turn the remainder so that the coarse body is
+        almost free, and by that tangent the border would fold over the ball within 20 ms."""
+        for element in ("tet4", "tet4a"):
             file = self.bake_liver(element)
-            self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{(y - less) / 1000},{z / 1000}\n" for t, x, y, z in FAST))
+            self.write("fast.csv", "t,x,y,z\n" + "".join(f"{t},{x / 1000},{y / 1000},{z / 1000}\n" for t, x, y, z in FAST))
             result = run(RUNTIME, "play", file, "--device", "script:fast.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", "yes", "--report", "-",
                          cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads(result.stdout)
-            self.assertGreater(report["ticks_in_contact"], least)
+            self.assertGreater(report["ticks_in_contact"], 3000)
             self.assertEqual([report["status_ticks"][status] for status in ("inside_body", "result_not_finite", "not_converged")], [0, 0, 0])
             self.assertLess(report["largest_jump_N"], 0.03 * report["largest_force_N"])
 
