@@ -55,6 +55,9 @@ struct TickRecord {
   std::int32_t left_out = 0;
   /// bound of the error of `force` that compressed Green's functions cause; 0 if they are exact [N]
   float greens_error = 0.0F;
+  /// body on two levels: by which small strain has more force for the places of the last balance, as a
+  /// fraction of it; else 0
+  float small_strain = 0.0F;
 };
 
 /// Surface of the body at one moment.

@@ -84,7 +84,7 @@ SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::st
   if (said == layout.metadata.end() || value("format") != "palpate-recording")
     throw Error("is an MCAP file, but not a recording of Palpate's", path, give_another);
   const std::string version = value("version");
-  if (version.substr(0, version.find('.')) != "6")
+  if (version.substr(0, version.find('.')) != "7")
     throw Error("is a recording of another version", path, record_again);
   generator = value("generator");
   SessionInfo info{.model_path = value("model"),
@@ -141,6 +141,7 @@ void check_tick(const TickRecord& tick, double before, std::size_t row, const Re
   expect(tick.contacts >= 0, "contacts", tick.contacts, "a number of contacts");
   expect(is_error(tick.force_error), "force_error", tick.force_error, "the size of an error");
   expect(is_error(tick.greens_error), "greens_error", tick.greens_error, "the size of an error");
+  expect(std::isfinite(tick.small_strain), "small_strain", tick.small_strain, "a number");
   expect(tick.left_out >= 0, "left_out", tick.left_out, "a number of contacts");
   expect(tick.patch >= -1, "patch", tick.patch, "a node, or -1 for none");
   expect(tick.grab <= 1, "grab", int{tick.grab}, "0 or 1");

@@ -141,6 +141,7 @@ void for_each_tick_field(Tick& tick, Visitor&& visit) {
   visit.number("int32", "left_out", tick.left_out);
   visit.number("float32", "force_error", tick.force_error);
   visit.number("float32", "greens_error", tick.greens_error);
+  visit.number("float32", "small_strain", tick.small_strain);
   visit.number("uint8", "grab", tick.grab);
   visit.number("uint8", "phase", tick.phase);
   visit.number("uint8", "fault", tick.fault);

@@ -52,7 +52,7 @@ struct RecordingWriter::Impl {
       : writer(std::move(file), "palpate " PALPATE_VERSION) {
     writer.add(mcap::Metadata{.name = "palpate",
                               .values = {{"format", "palpate-recording"},
-                                         {"version", "6.0"},
+                                         {"version", "7.0"},
                                          {"generator", "palpate " PALPATE_VERSION},
                                          {"model", info.model_path},
                                          {"content_hash", info.content_hash},

@@ -201,6 +201,7 @@ std::optional<Precision> take_up(const BakeRun& run, Model& model) {
   if (run.team.leads()) left = take_up_begun_model(options.output, model);
   if (run.team.share(left ? "left" : "").empty()) return {};
   if (!run.team.leads()) left = take_up_begun_model(options.output, model);
+  run.team.any(!left);  // the leader goes on, and writes to the file, once all have read it
   if (!left) {
     throw Error("is not the file that another rank has found: the nodes do not share this folder",
                 options.output.string() + ".partial",

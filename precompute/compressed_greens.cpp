@@ -223,7 +223,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
                                                   std::size_t(plan.frame.tree.clusters()))));
   const std::int64_t touched = std::int64_t{model.dimension()} * certified_nodes.back();
   plan.memory_bytes = solver_bytes(factor) +
-                      jobs * (compression_workspace(factor, plan.frame) +
+                      jobs * (compression_workspace(factor, plan.stored.dofs, plan.frame) +
                               touch_matrices * touched * touched * std::int64_t{sizeof(double)}) +
                       thread_bytes(jobs) + plan.frame.bytes() + recompression_copies * plan.far_bytes +
                       static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);

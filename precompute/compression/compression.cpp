@@ -16,14 +16,15 @@ namespace {
 using Dofs = std::vector<std::int64_t>;
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double skeleton_share = 0.2;       // of the cut: skeletons must not add to the error
-constexpr Index leaves_estimated = 64;       // to estimate flops
-constexpr std::int64_t loads_at_once = 32;   // solved together
-constexpr std::int64_t checked_at_once = 8;  // of these, by a thread
-constexpr Index checks = 32;                 // more loads, to measure the error of the pairs
-constexpr double near_work = 1.6;            // of forward solutions: some are made twice, and multiplied
-constexpr std::int64_t near_forward = 2;     // times the memory, as random loads need none yet
-constexpr double single_share = 0.3;         // of the skeletons' cut, that single precision may add
+constexpr double skeleton_share = 0.2;        // of the cut: skeletons must not add to the error
+constexpr Index leaves_estimated = 64;        // to estimate flops
+constexpr std::int64_t loads_at_once = 32;    // solved together
+constexpr std::int64_t checked_at_once = 8;   // of these, by a thread
+constexpr Index checks = 32;                  // more loads, to measure the error of the pairs
+constexpr double near_work = 1.6;             // of forward solutions: some are made twice, and multiplied
+constexpr std::int64_t solutions_in_use = 3;  // of a thread (measured with 1 to 16 threads)
+constexpr std::int64_t near_forward = 2;      // times the memory, as random loads need none yet
+constexpr double single_share = 0.3;          // of the skeletons' cut, that single precision may add
 
 /// Xi f for loads f [order x loads]: up the tree, across the far pairs, down the tree, and the near pairs.
 DoubleRows product(const HierarchicalMatrix& matrix, const DoubleRows& f, int jobs) {
@@ -282,10 +283,18 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
   return near_work * flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
 }
 
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
-  const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
-  // Random loads and their responses, or else a forward solution of a group: as large as of one on all rows.
-  return 2 * SelectedSolver(factor).workspace_bytes(std::max(frame.dimension * leaf, loads_at_once));
+std::int64_t compression_workspace(const Factor& factor, std::span<const std::int64_t> stored_dofs,
+                                   const HierarchicalMatrix& frame) {
+  const SelectedSolver solver(factor);
+  const ClusterTree& tree = frame.tree;
+  const Index together = clusters_together(tree.levels);
+  std::int64_t forward = 0;
+  for (Index c = tree.first_leaf(); c < tree.clusters(); c += together) {
+    const std::int64_t begin = first_dof(frame, c), end = end_dof(frame, c + together - 1);
+    forward = std::max(forward, solver.forward_bytes(stored_dofs.subspan(at(begin), at(end - begin))));
+  }
+  // Random loads and their responses, or else forward solutions.
+  return std::max(2 * solver.workspace_bytes(loads_at_once), solutions_in_use * forward);
 }
 
 std::int64_t solver_bytes(const Factor& factor) {

@@ -90,7 +90,8 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
                   const HierarchicalMatrix& frame);
 
 /// Memory of one thread [byte].
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame);
+std::int64_t compression_workspace(const Factor& factor, std::span<const std::int64_t> stored_dofs,
+                                   const HierarchicalMatrix& frame);
 
 /// Memory of solvers beside the factor: its diagonal blocks inverted, and its copy in single precision
 /// [byte].

@@ -198,6 +198,16 @@ double SelectedSolverOf<Real>::forward_flops(std::span<const std::int64_t> dofs)
   return of_column * static_cast<double>(dofs.size());
 }
 
+template <class Real>
+std::int64_t SelectedSolverOf<Real>::forward_bytes(std::span<const std::int64_t> dofs) const {
+  std::vector<std::uint8_t> on_path;
+  mark(dofs, on_path);
+  std::int64_t rows = 0;
+  for (std::size_t s = 0; s < on_path.size(); ++s)
+    if (on_path[s] != 0) rows += sweeps_.supernodes()[s].columns;
+  return rows * std::ssize(dofs) * std::int64_t{sizeof(Real)};
+}
+
 template void multiply(const ForwardColumns<double>&, const ForwardColumns<double>&, std::span<double>);
 template void multiply(const ForwardColumns<float>&, const ForwardColumns<float>&, std::span<float>);
 template class SelectedSolverOf<double>;

@@ -83,6 +83,8 @@ class SelectedSolverOf {
 
   /// Multiplications and additions of `forward`, for one cluster.
   [[nodiscard]] double forward_flops(std::span<const std::int64_t> dofs) const;
+  /// Memory of `forward`, for the dofs of all clusters.
+  [[nodiscard]] std::int64_t forward_bytes(std::span<const std::int64_t> dofs) const;
 
   [[nodiscard]] std::int64_t workspace_bytes(std::int64_t columns) const {
     return sweeps_.workspace_bytes(columns);

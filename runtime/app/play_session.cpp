@@ -11,7 +11,6 @@
 #include "base/write_file.h"
 #include "runtime/app/play_report.h"
 #include "runtime/background/live_motion.h"
-#include "runtime/background/two_level_motion.h"
 #include "runtime/loop/last_tick.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/real_time.h"
@@ -109,7 +108,8 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
           }
         });
   }
-  if (viewer.pictures) show_pictures(viewer);
+  if (viewer.pictures)
+    viewed_.emplace(body, state_, SurfaceFramesOptions{.ticks_per_frame = 1}, viewer.pictures);
   if (viewer.ticks) feed_.emplace(viewer.ticks);
   if (!options_.fast) {
     monitor_.emplace(MonitorOptions{.rate = settings.rate,
@@ -163,17 +163,6 @@ LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   const RealTimeRights rights(options_.processor);
   if (!rights.refused().empty()) print_warning(rights.refused());
   return run_loop(parts, loop, stop);
-}
-
-void PlaySession::show_pictures(const SessionViewer& viewer) {
-  viewed_.emplace(
-      body_, state_, SurfaceFramesOptions{.ticks_per_frame = 1},
-      [this, show = viewer.pictures](SurfacePicture picture) { show(std::move(picture), small_strain()); });
-}
-
-std::optional<double> PlaySession::small_strain() const {
-  const auto* const deep = motion_ ? dynamic_cast<const TwoLevelMotion*>(&motion_->stepper()) : nullptr;
-  return deep != nullptr ? std::optional(deep->telling().last_small_strain) : std::nullopt;
 }
 
 void PlaySession::tell(const PlayedParts* parts) const {

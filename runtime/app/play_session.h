@@ -23,9 +23,7 @@ constexpr const char* standard_output = "-";
 struct SessionViewer {
   LoopControl* control = nullptr;
   TickFeed::Sink ticks;
-  /// With a picture, by which small strain has more force than the body on two levels then, as a fraction of
-  /// it; empty for other bodies.
-  std::function<void(SurfacePicture, std::optional<double>)> pictures;
+  SurfaceFrames::Sink pictures;
   Recorder::OnFailure recording_failed;
 };
 
@@ -61,8 +59,6 @@ class PlaySession {
   void tell(const PlayedParts* parts = nullptr) const;
 
  private:
-  void show_pictures(const SessionViewer& viewer);
-  [[nodiscard]] std::optional<double> small_strain() const;
   LoopReport run_with_rights(const std::atomic<bool>& stop);
   void finish_recording();
 

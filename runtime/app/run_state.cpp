@@ -75,7 +75,7 @@ nlohmann::json to_json(const RunState& state) {
           {"locked", text_or_null(state.locked)},
           {"fault", fault_or_null(state.fault)},
           {"change", change_or_null(state.change)},
-          {"small_strain", number_or_null(state.small_strain)},
+          {"small_strain", state.small_strain},
           {"phase", safety_phase_names[static_cast<std::size_t>(state.phase)].second}};
 }
 

@@ -34,7 +34,7 @@ struct RunState {
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   std::optional<SurfaceChange> change{};  ///< change of the surface shown at most half a second ago
-  std::optional<double> small_strain{};   ///< SessionViewer::pictures
+  double small_strain = 0.0;              ///< TickNote::small_strain
   SettingsText settings;
   std::string tool_note;  ///< from too_small (fitting_tool.h); empty if the tool is large enough
 };

@@ -148,8 +148,8 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
       SessionViewer{.control = &control_,
                     .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
                     .pictures =
-                        [this](SurfacePicture picture, std::optional<double> small_strain) {
-                          take_change(picture.frame, small_strain);
+                        [this](SurfacePicture picture) {
+                          take_change(picture.frame);
                           server_->show_picture(std::move(picture), body_.get());
                         },
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
@@ -390,7 +390,7 @@ void ViewedPlay::take_recording_failure(const Error& reason) {
 }
 
 /// Called by the thread that makes pictures, no more often than the state is sent: it takes milliseconds.
-void ViewedPlay::take_change(const SurfaceFrame& frame, std::optional<double> small_strain) {
+void ViewedPlay::take_change(const SurfaceFrame& frame) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_change_) return;
   next_change_ = now + state_period;
@@ -401,7 +401,6 @@ void ViewedPlay::take_change(const SurfaceFrame& frame, std::optional<double> sm
   const SurfaceChange change = surface_change(body_->dimension(), body_->drawn_simplices(), mesh, u);
   const std::lock_guard lock(mutex_);
   state_.change = change;
-  state_.small_strain = small_strain;
 }
 
 void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
@@ -414,6 +413,7 @@ void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
   const bool other = state_.phase != last.phase || state_.fault != last.fault;
   state_.phase = last.phase;
   state_.fault = last.fault;
+  state_.small_strain = last.small_strain;
   if (!other) return;
   changed_ = true;
   tell_.notify_all();

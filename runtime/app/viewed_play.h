@@ -77,7 +77,7 @@ class ViewedPlay : public ViewedRun {
   void begin_making(const char* what);
   void refuse(const Error& why);
   void take_recording_failure(const Error& reason);
-  void take_change(const SurfaceFrame& frame, std::optional<double> small_strain);
+  void take_change(const SurfaceFrame& frame);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 

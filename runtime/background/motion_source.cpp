@@ -142,6 +142,7 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
   sample.compliance = stepper_->compliance();
   sample.force_error = stepper_->force_error();
+  sample.small_strain = stepper_->small_strain();
   stepper_->tell_untouched(sample.untouched);
   stepper_->tell_shift(sample.shift);
   let_go_done_ = job.let_go;

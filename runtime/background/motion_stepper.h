@@ -28,6 +28,8 @@ class MotionStepper {
   virtual void tell_shift(std::vector<double>& shift) const noexcept { shift.clear(); }
   /// Error of the job's forces, as a fraction of them, where it is more than a hand can feel; else 0.
   [[nodiscard]] virtual double force_error() const noexcept { return 0.0; }
+  /// MotionSample::small_strain of the job's forces.
+  [[nodiscard]] virtual double small_strain() const noexcept { return 0.0; }
   /// Compliance for contact forces, whose effect is added to u; null: the body's Green's functions.
   [[nodiscard]] virtual std::shared_ptr<const Greens> compliance() const noexcept { return nullptr; }
 };

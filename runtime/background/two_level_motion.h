@@ -38,6 +38,7 @@ class TwoLevelMotion final : public MotionStepper {
   [[nodiscard]] std::shared_ptr<const Greens> compliance() const noexcept override { return renewed_; }
 
   [[nodiscard]] double force_error() const noexcept override { return force_error_; }
+  [[nodiscard]] double small_strain() const noexcept override { return telling_.last_small_strain; }
   void tell_shift(std::vector<double>& shift) const noexcept override { shift = shift_; }
 
   [[nodiscard]] DepthTelling telling() const;  ///< for any thread

@@ -76,7 +76,7 @@ ToolPose to_pose(const palpate_pose& pose) noexcept {
           .grab = pose.grab != 0};
 }
 
-palpate_result to_result(const ToolState& state) noexcept {
+palpate_result to_result(const ToolState& state, double small_strain) noexcept {
   palpate_result result{};
   copy(state.wrench.force, result.force);
   copy(state.wrench.torque, result.torque);
@@ -94,6 +94,7 @@ palpate_result to_result(const ToolState& state) noexcept {
   result.force_error = state.force_error;
   result.left_out = state.left_out;
   result.greens_error = state.greens_error;
+  result.small_strain = small_strain;
   return result;
 }
 
@@ -294,7 +295,9 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
   const Inside<OwnLoop> loop(const_cast<palpate_session*>(session), Use::alone);  // NOLINT: as in look
   palpate_result felt{};
   const bool exists = loop && tool >= 0 && static_cast<std::size_t>(tool) < loop->state.tools.size();
-  if (exists) felt = to_result(loop->state.tools[static_cast<std::size_t>(tool)]);
+  if (exists)
+    felt = to_result(loop->state.tools[static_cast<std::size_t>(tool)],
+                     loop->state.surface.motion.small_strain());
   if (!write_struct(felt, result)) return -1;
   if (!loop) return refused(session);
   return exists ? 0 : -1;

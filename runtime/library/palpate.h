@@ -193,13 +193,15 @@ typedef struct palpate_result {
   int left_out;               /* contact points pressed by the tool beyond the capacity */
   double greens_error;        /* bound on the error of `force` from compressed Green's functions; 0 if they
                                * are exact [N] */
+  double small_strain;        /* with `depth`: by which small strain has more force for the places of the last
+                               * balance, as a fraction of it; else 0 */
 } palpate_result;
 
 /* Default result: all zero. */
 #define PALPATE_RESULT_INIT                                                                             \
   {                                                                                                     \
     sizeof(palpate_result), {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0, \
-        {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0, 0, 0.0                \
+        {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0, 0, 0.0, 0.0           \
   }
 
 /* Writes the members of `result` for tool 0, 1, ... Returns 0; -1 if there is no such tool, with all members

@@ -243,6 +243,7 @@ class Loop {
                              .status = parts_.state.status,
                              .force_error = tool().force_error,
                              .left_out = tool().left_out,
+                             .small_strain = parts_.state.surface.motion.small_strain(),
                              .phase = phase(),
                              .fault = fault_,
                              .events = news_.events};

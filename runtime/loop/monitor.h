@@ -29,6 +29,7 @@ struct TickNote {
   StepStatus status = StepStatus::ok;
   double force_error = 0.0;   ///< possible error of `force` if it is a best effort [N]
   std::int32_t left_out = 0;  ///< contact points beyond the capacity
+  double small_strain = 0.0;  ///< TickRecord::small_strain
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   DeviceEvent events = DeviceEvent::none;

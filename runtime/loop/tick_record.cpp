@@ -44,6 +44,8 @@ void record_tool(TickRecord& record, const Body& body, const State& state, const
   record.motion_step = state.surface.motion.sample_step();
   record.force_error = static_cast<float>(std::min<double>(tool.force_error, largest_float));
   record.left_out = tool.left_out;
+  record.small_strain = static_cast<float>(
+      std::clamp<double>(state.surface.motion.small_strain(), -largest_float, largest_float));
   record.greens_error = static_cast<float>(std::min<double>(tool.greens_error, largest_float));
 }
 

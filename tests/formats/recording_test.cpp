@@ -60,7 +60,8 @@ TickRecord some_tick(std::size_t i) {
           .motion_step = n / 3,
           .force_error = static_cast<float>(0.125 * x),
           .left_out = static_cast<std::int32_t>(i % 11),
-          .greens_error = static_cast<float>(0.0625 * x)};
+          .greens_error = static_cast<float>(0.0625 * x),
+          .small_strain = static_cast<float>(-0.03125 * x)};
 }
 
 SurfaceFrame some_frame(std::size_t k) {
@@ -87,7 +88,8 @@ bool same(const TickRecord& a, const TickRecord& b) {
          a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
          equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
          a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step &&
-         a.force_error == b.force_error && a.left_out == b.left_out && a.greens_error == b.greens_error;
+         a.force_error == b.force_error && a.left_out == b.left_out && a.greens_error == b.greens_error &&
+         a.small_strain == b.small_strain;
 }
 
 ContactLoads some_loads(std::size_t k) {
@@ -566,6 +568,7 @@ const Impossible impossible[] = {
     {"Patch", tick_with([](TickRecord& t) { t.patch = -2; }), "/tool/0/tick, row 2: patch is -2"},
     {"Contacts", tick_with([](TickRecord& t) { t.contacts = -1; }), "row 2: contacts is -1"},
     {"ForceError", tick_with([](TickRecord& t) { t.force_error = -1.0F; }), "row 2: force_error is -1"},
+    {"SmallStrain", tick_with([](TickRecord& t) { t.small_strain = NAN; }), "row 2: small_strain is nan"},
     {"GreensError", tick_with([](TickRecord& t) { t.greens_error = NAN; }), "row 2: greens_error is nan"},
     {"LeftOut", tick_with([](TickRecord& t) { t.left_out = -7; }), "row 2: left_out is -7"},
     {"Grab", tick_with([](TickRecord& t) { t.grab = 2; }), "row 2: grab is 2"},
@@ -799,9 +802,9 @@ TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
   const Folder folder;
   const std::filesystem::path path = folder / "a.mcap";
   record(path, 3, 3);
-  change_metadata(path, "6.0", "6.7");
+  change_metadata(path, "7.0", "7.7");
   EXPECT_EQ(RecordingFile(path).ticks(), 3);
-  change_metadata(path, "6.7", "7.0");
+  change_metadata(path, "7.7", "6.0");
   EXPECT_NE(refusal_of(path).find("another version | Record the session again"), std::string::npos);
   record(path, 3, 3);
   for (const char* rate : {"0000", "-200", "20x0"}) {

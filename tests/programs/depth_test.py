@@ -125,18 +125,23 @@ class Depth(ProgramTest):
     def test_an_own_loop_feels_it_and_replays(self):
         file = self.bake(TONGUE)
         deep, _, _ = self.play(file, 40, "--overlay", "no", seconds=0.3)
-        path = palpate.read(self.folder / "bend.mcap")["device_position"]
+        recording = palpate.read(self.folder / "bend.mcap")
+        path, told = recording["device_position"], recording["small_strain"][-1]
         with palpate.Session(file, palpate.Tool(radius=RADIUS), max_contacts=256, depth=True) as session:
             session.record(self.folder / "own.mcap")
             for place in path:
-                force = session.step(place).force
+                felt = session.step(place)
+                force = felt.force
                 time.sleep(0.0005)  # its balance is found by another thread
             end = time.monotonic() + PATIENCE
             while abs(numpy.linalg.norm(force) / deep[-1] - 1) > 1e-3 and time.monotonic() < end:
-                force = session.step(path[-1]).force
+                felt = session.step(path[-1])
+                force = felt.force
                 time.sleep(0.001)
             session.end_recording()
         self.assertAlmostEqual(numpy.linalg.norm(force) / deep[-1], 1, delta=1e-3)
+        self.assertGreater(told, 0.1)
+        self.assertAlmostEqual(felt.small_strain, told, delta=0.02 * told)
         result = run(RUNTIME, "play", file, "--device", "replay:own.mcap", "--fast", "--report", "-", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(json.loads(result.stdout)["replay"]["different_ticks"], 0)
@@ -209,13 +214,17 @@ class Depth(ProgramTest):
             self.write("press.csv", f"t,x,y,z\n0,0.155,0.0015,0.117\n1,0.155,{0.0035 + depth},0.117\n1.5,0.155,{0.0035 + depth},0.117\n")
             forces = {}
             for mode in ("yes", "no"):
-                result = run(RUNTIME, "play", file, "--device", "script:press.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", mode, "--report", "-", cwd=self.folder)
+                result = run(RUNTIME, "play", file, "--device", "script:press.csv", "--fast", "--tool", "sphere:0.02", "--friction", "0", "--depth", mode, "--report", "-", "--record", "press.mcap", "--force",
+                             cwd=self.folder)
                 self.assertEqual(result.returncode, 0, result.stderr)
                 report = json.loads(result.stdout)
                 forces[mode] = report["largest_force_N"]
                 if mode == "yes":
                     told = report["depth"]["small_strain_at_largest_force"]
                     self.assertAlmostEqual(report["depth"]["last_small_strain"], told, delta=1e-6)
+                    kept = palpate.read(self.folder / "press.mcap")["small_strain"]
+                    self.assertAlmostEqual(kept[-1], told, delta=1e-6)
+                    self.assertEqual(kept[0], 0)
                     self.assertIn(f"small strain has {100 * told:.3g} % more", result.stderr)
             right = forces["no"] / forces["yes"] - 1
             self.assertGreater(right, least)

@@ -400,6 +400,7 @@ bool FreeMotion::receive(const MotionSample& sample) noexcept {
   }
   sampled_.step = sample.step;
   sampled_.force_error = sample.force_error;
+  sampled_.small_strain = sample.small_strain;
   if (!is_on_two_levels_)
     sampled_.job.seen = sample.step;  // on two levels its forces are of the sample before
   // A step that has a time of its own ends with it. Others, however late, move the surface no faster than

@@ -54,6 +54,8 @@ struct MotionSample {
   /// empty: not known.
   std::vector<double> shift{};
   double force_error = 0.0;  ///< of the job's forces, as a fraction of them
+  /// Body on two levels: by which small strain has more force for the same places, as a fraction of it.
+  double small_strain = 0.0;
   /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
 };
@@ -138,8 +140,9 @@ class FreeMotion {
   /// Adds sign * u [n or n + n_q] to the motion until the next sample, to compensate a change of the
   /// displacement by contact forces when their compliance changes. Call after `receive`.
   void take_over(const ElasticBody& body, std::span<const double> u, double sign) noexcept;
-  [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }   ///< last sample's
-  [[nodiscard]] double force_error() const noexcept { return sampled_.force_error; }  ///< last sample's
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sampled_.step; }     ///< last sample's
+  [[nodiscard]] double force_error() const noexcept { return sampled_.force_error; }    ///< last sample's
+  [[nodiscard]] double small_strain() const noexcept { return sampled_.small_strain; }  ///< last sample's
   /// True if packed dynamics are late, after begin_tick: the displayed motion waits for them.
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && sampled_.job.step > sampled_.step; }
 
@@ -185,6 +188,7 @@ class FreeMotion {
     double most_change = -1.0;      // from `before` to u, of any dof; negative: not known
     std::vector<double> untouched;  // [n] empty unless live
     double force_error = 0.0;       // MotionSample::force_error
+    double small_strain = 0.0;      // MotionSample::small_strain
   };
   struct SurfaceNode {
     std::int64_t stamp = -2;  // tick of the value

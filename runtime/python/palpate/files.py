@@ -225,8 +225,8 @@ class Recording:
         self.info = file.metadata.get("palpate", {})
         if self.info.get("format") != "palpate-recording":
             raise Error(f"{file.path} is an MCAP file, and not of Palpate", _RECORDING)
-        if self.info.get("version", "").partition(".")[0] != "6":
-            raise Error(f"{file.path} has version {self.info.get('version')!r}, and this package reads 6", "record it again")
+        if self.info.get("version", "").partition(".")[0] != "7":
+            raise Error(f"{file.path} has version {self.info.get('version')!r}, and this package reads 7", "record it again")
         self.finished = file.finished
         tools = sorted(topic for topic in file.channels if topic.startswith("/tool/") and topic.endswith("/tick"))
         if not tools:

@@ -74,7 +74,7 @@ class CResult(Structure):
     _fields_ = [("size", c_size_t), ("force", c_double * 3), ("torque", c_double * 3), ("tool_position", c_double * 3),
                 ("tool_orientation", c_double * 4), ("contacts", c_int), ("local_stiffness", c_double * 9),
                 ("local_point", c_double * 3), ("local_radius", c_double), ("force_error", c_double),
-                ("left_out", c_int), ("greens_error", c_double)]
+                ("left_out", c_int), ("greens_error", c_double), ("small_strain", c_double)]
 
 
 class CContact(Structure):

@@ -67,6 +67,7 @@ class Felt:
     local_radius: float  # of local_point, within which that holds
     force_error: float  # how far the force may be off, about, where the tick was a best effort; else 0
     left_out: int  # contact points that the tool presses on and that found no room
+    small_strain: float  # with depth: by which small strain has more force for the same places, as a fraction of it; else 0
     greens_error: float  # what the force may be off by at most as compressed Green's functions are not exact
     status: frozenset[str]  # of the tick, such as "not_converged"; empty where all is well
 

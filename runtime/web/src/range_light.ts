@@ -32,7 +32,7 @@ export function turned_beside(rest_normal: ArrayLike<number>, { position, normal
 }
 
 /** How much more force small strain would have, in few words and in a sentence; null where that is not known, or less than 1 %. */
-export function small_strain_words(more: number | null | undefined): { short: string; sentence: string } | null {
+export function small_strain_words(more: number | undefined): { short: string; sentence: string } | null {
   const percent = Math.round(100 * (more ?? 0));
   if (percent === 0) return null;
   const size = Math.abs(percent);

@@ -56,7 +56,7 @@ export interface State {
   phase: string;
   misses: number;
   change?: { rotation: number; strain: number } | null; // the largest of the surface [rad], [-]; null: not known
-  small_strain?: number | null; // by which small strain has more force than two levels, as a fraction; null: not on two levels
+  small_strain?: number; // by which small strain has more force than two levels, as a fraction; 0: not on two levels
   settings: Record<string, string>;
   tool_note: string; // may be empty
   defaults: { radius: number; reach: number; friction: number; depth: number };
