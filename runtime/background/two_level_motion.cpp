@@ -229,7 +229,7 @@ void TwoLevelMotion::tell(const TwoLevelReport& report) {
   telling_.last_residual = report.residual;
   telling_.unbalanced += report.converged ? 0 : 1;
   telling_.last_small_strain = 0.0;
-  if (!report.converged || levels_.loaded().empty()) return;
+  if (!report.converged || force_error_ > 0.0 || levels_.loaded().empty()) return;
   const double force = sum_of(levels_.forces(), body_.dimension()).norm();
   if (force < least_error * telling_.largest_force || force == 0.0) return;
   telling_.last_small_strain = report.small_strain.norm() / force - 1.0;

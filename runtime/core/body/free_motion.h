@@ -54,7 +54,8 @@ struct MotionSample {
   /// empty: not known.
   std::vector<double> shift{};
   double force_error = 0.0;  ///< of the job's forces, as a fraction of them
-  /// Body on two levels: by which small strain has more force for the same places, as a fraction of it.
+  /// Body on two levels: by which small strain has more force for the same places, as a fraction of it; 0
+  /// where the tick's force is not that of the balance.
   double small_strain = 0.0;
   /// [n] live body: displacement without the tool's indentation, moving with the body [m]; else empty.
   std::vector<double> untouched{};
